@@ -1,0 +1,103 @@
+"""Every error a user can meet, each class with its exit code.
+
+========== =====================================================================
+exit code  meaning
+========== =====================================================================
+0          ok
+1          the spec is wrong (`SpecError`)
+2          the command line is wrong (click's own)
+3          a limit is exceeded (`LimitError`)
+4          internal error: a bug of phigen
+5          a check failed: mathematics refuted, stale or edited output (`CheckError`)
+6          no usable C toolchain, or it failed (`ToolchainError`)
+7          an integration failed (`StepError`)
+========== =====================================================================
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+
+@dataclass(frozen=True, order=True)
+class Location:
+    """A place in a source file; line and column count from 1."""
+
+    line: int
+    column: int
+    file: str = "<spec>"
+
+    def __str__(self) -> str:
+        return f"{self.file}:{self.line}:{self.column}"
+
+
+@dataclass(frozen=True)
+class Diagnostic:
+    """One message about a spec: where, what is wrong (with the value), and how to mend it."""
+
+    message: str
+    location: Location | None = None
+    hint: str = ""
+    source_line: str = ""
+    severity: str = "error"
+
+    def __str__(self) -> str:
+        head = f"{self.location}: {self.severity}: {self.message}" if self.location else f"{self.severity}: {self.message}"
+        lines = [head]
+        if self.location and self.source_line:
+            lines += [f"    {self.source_line}", "    " + " " * (self.location.column - 1) + "^"]
+        if self.hint:
+            lines.append(f"  hint: {self.hint}")
+        return "\n".join(lines)
+
+
+class PhigenError(Exception):
+    """Base of all errors that are the user's to mend; anything else is a bug of phigen."""
+
+    exit_code = 4
+
+
+class SpecError(PhigenError):
+    """The spec is wrong; holds every diagnostic of the run, in the order of the file."""
+
+    exit_code = 1
+
+    def __init__(self, diagnostics: list[Diagnostic]) -> None:
+        self.diagnostics = diagnostics
+        super().__init__("\n".join(str(d) for d in diagnostics))
+
+
+class LimitError(SpecError):
+    """The spec, or what it would compile to, exceeds a limit."""
+
+    exit_code = 3
+
+
+class CheckError(PhigenError):
+    """A check failed: a refuted statement, or generated files that are stale or were edited."""
+
+    exit_code = 5
+
+
+class ToolchainError(PhigenError):
+    """There is no usable C compiler, or it refused the generated code."""
+
+    exit_code = 6
+
+
+class StepError(PhigenError):
+    """A step could not be made; the state before it stands.
+
+    Attributes: ``step`` (number of the failing step, from 0), ``status`` (the name of the solver's status,
+    e.g. ``NO_CONVERGENCE``), ``trajectory`` (what was computed before it, or ``None``), ``members``
+    (indices of the members of an ensemble that failed).
+    """
+
+    exit_code = 7
+
+    def __init__(
+        self, message: str, *, step: int, status: str, trajectory: Any = None, members: tuple[int, ...] = ()
+    ) -> None:
+        super().__init__(message)
+        self.step, self.status, self.trajectory, self.members = step, status, trajectory, members

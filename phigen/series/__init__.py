@@ -1,0 +1,1 @@
+"""Generating functions: the Hamilton–Jacobi series of a Hamiltonian in a bi-realisation."""

@@ -1,0 +1,144 @@
+"""What a spec file says, as data: the first stage of the compiler.
+
+Nothing here is checked mathematically. Expressions have their definitions substituted and use the names
+of the spec's coordinates and parameters as symbols; ``p_NAME`` in a custom bi-realisation is the symbol
+``p:NAME``. Decimals are exact rationals.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from fractions import Fraction
+from typing import Any
+
+from phigen.errors import Location
+from phigen.symbolic.expression import Expression
+
+Matrix = tuple[tuple[Expression, ...], ...]
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A run-time argument of the generated code, with its default."""
+
+    name: str
+    value: Fraction
+    positive: bool = False
+    description: str = ""
+
+
+@dataclass(frozen=True)
+class MatrixForm:
+    """π given entry by entry, π_ij = {x_i, x_j} (from ``matrix:`` or, completed by skew symmetry, ``brackets:``)."""
+
+    entries: Matrix
+
+
+@dataclass(frozen=True)
+class CanonicalForm:
+    """{q_i, p_i} = 1, all other brackets 0; coordinates named in neither list are Casimirs."""
+
+    q: tuple[str, ...]
+    p: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class LogCanonicalForm:
+    """{x_i, x_j} = a_ij x_i x_j; the a_ij may contain parameters."""
+
+    a: Matrix
+
+
+@dataclass(frozen=True)
+class LieAlgebraForm:
+    """{x_i, x_j} = ± Σ_k c_ij^k x_k on the dual of a Lie algebra; exactly one of the three sources is given.
+
+    ``structure_constants[i][j][k]`` is c_ij^k over 0-based basis indices, only the pairs that were given.
+    """
+
+    sign: int = 1
+    family: str = ""  # "so", "se", "sl", "gl", "su", "sp", "heisenberg", "aff"
+    size: int = 0  # the n of so(n); 2n for sp(2n)
+    matrices: tuple[Matrix, ...] = ()
+    structure_constants: Mapping[int, Mapping[int, Mapping[int, Expression]]] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class NambuForm:
+    """{f, g} = det ∂(f, g, C_1, …, C_{n−2})/∂(x_1, …, x_n)."""
+
+    casimirs: tuple[Expression, ...]
+
+
+PoissonForm = MatrixForm | CanonicalForm | LogCanonicalForm | LieAlgebraForm | NambuForm
+
+
+@dataclass(frozen=True)
+class BirealisationChoice:
+    """The user's choice: a kind of the catalogue and its options (``custom``: alpha, beta)."""
+
+    kind: str = "auto"
+    alpha: tuple[Expression, ...] = ()
+    beta: tuple[Expression, ...] = ()
+    side: str = "q"  # canonical-euler
+
+
+@dataclass(frozen=True)
+class SolverOptions:
+    """The inner solve: ``method`` auto or newton, ``tolerance`` None for auto."""
+
+    method: str = "auto"
+    tolerance: Fraction | None = None
+    max_iterations: int = 20
+
+
+@dataclass(frozen=True)
+class Run:
+    """A named experiment."""
+
+    name: str
+    initial: tuple[Fraction, ...]
+    step: Fraction
+    steps: int
+    stride: int = 1
+    parameters: Mapping[str, Fraction] = field(default_factory=dict)
+    exact: Mapping[str, Expression] = field(default_factory=dict)  # symbols t:, x0:NAME, parameters
+    compare: tuple[str, ...] = ()
+    section: Expression | None = None
+    description: str = ""
+
+
+@dataclass(frozen=True)
+class Spec:
+    """A spec file; `locations` gives the place of a part by its path of keys, e.g. ``("casimirs", "C")``."""
+
+    name: str
+    coordinates: tuple[str, ...]
+    poisson: PoissonForm
+    hamiltonian: Expression
+    parameters: tuple[Parameter, ...] = ()
+    casimirs: Mapping[str, Expression] = field(default_factory=dict)
+    invariants: Mapping[str, Expression] = field(default_factory=dict)
+    birealisation: BirealisationChoice = BirealisationChoice()
+    order: int | None = None  # exactly one of order and terms is set
+    terms: int | None = None
+    composition: str = "none"
+    gauge: str = "none"
+    scheme: str = "auto"
+    solver: SolverOptions = SolverOptions()
+    targets: tuple[str, ...] = ("c", "numpy")
+    runs: Mapping[str, Run] = field(default_factory=dict)
+    title: str = ""
+    description: str = ""
+    references: tuple[str, ...] = ()
+    license: str = "0BSD"
+    source_sha256: str = ""
+    file: str = "<spec>"
+    source: str = ""
+    locations: Mapping[tuple[Any, ...], Location] = field(default_factory=dict)
+
+    @property
+    def dimension(self) -> int:
+        """Number of coordinates."""
+        return len(self.coordinates)

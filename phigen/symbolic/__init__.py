@@ -1,0 +1,1 @@
+"""Formulas: the expression graph, the differential ring over it, and truncated power series."""

@@ -1,0 +1,549 @@
+"""Expressions: an immutable, interned directed acyclic graph of real arithmetic.
+
+The one representation of formulas in phigen: the parser makes it, the geometry differentiates it, the
+scheme assembles the one-step map from it, and the targets print it. Equal formulas built in the same
+way are the same object, so a shared sub-expression is stored, differentiated and printed once.
+
+Node kinds (``op``):
+
+=========== ======================= =====================================
+op          value                   args
+=========== ======================= =====================================
+``number``  `fractions.Fraction`    ()
+``symbol``  its name                ()
+``pi``/``E`` ``None``               ()
+``add``     ``None``                (a, b)
+``sub``     ``None``                (a, b)
+``neg``     ``None``                (a,)
+``mul``     ``None``                (a, b)
+``pow``     the rational exponent   (base,)
+a function  ``None``                its arguments, see `FUNCTIONS`
+=========== ======================= =====================================
+
+A quotient is a product with a ``pow`` of exponent −1. Names of symbols that phigen makes itself contain
+a colon (``p:x1``, ``h:``), which no name in a spec can; they never clash with names of the user.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from fractions import Fraction
+from functools import reduce
+from hashlib import blake2b
+from typing import Any, TypeVar
+from weakref import WeakValueDictionary
+
+#: Functions of an expression, with their number of arguments.
+FUNCTIONS: dict[str, int] = {
+    "exp": 1,
+    "log": 1,
+    "sin": 1,
+    "cos": 1,
+    "tan": 1,
+    "asin": 1,
+    "acos": 1,
+    "atan": 1,
+    "atan2": 2,
+    "sinh": 1,
+    "cosh": 1,
+    "tanh": 1,
+    "asinh": 1,
+    "acosh": 1,
+    "atanh": 1,
+    "abs": 1,
+    "sign": 1,  # made by differentiating abs, not accepted in a spec
+    "power": 2,  # base**exponent with an exponent that is not a rational number
+}
+
+_NODES: WeakValueDictionary[tuple[Any, ...], Expression] = WeakValueDictionary()
+_RANK = {"number": 0, "pi": 1, "E": 1, "symbol": 2}
+
+Number = int | Fraction
+T = TypeVar("T")
+
+
+class Expression:
+    """A node; make one with the functions of this module or with operators, never directly."""
+
+    __slots__ = ("__weakref__", "args", "depth", "digest", "op", "value")
+
+    op: str
+    args: tuple[Expression, ...]
+    value: Any
+    depth: int
+    digest: bytes
+
+    def __add__(self, other: Expression | Number) -> Expression:
+        return add(self, as_expression(other))
+
+    def __radd__(self, other: Number) -> Expression:
+        return add(as_expression(other), self)
+
+    def __sub__(self, other: Expression | Number) -> Expression:
+        return sub(self, as_expression(other))
+
+    def __rsub__(self, other: Number) -> Expression:
+        return sub(as_expression(other), self)
+
+    def __mul__(self, other: Expression | Number) -> Expression:
+        return mul(self, as_expression(other))
+
+    def __rmul__(self, other: Number) -> Expression:
+        return mul(as_expression(other), self)
+
+    def __truediv__(self, other: Expression | Number) -> Expression:
+        return mul(self, power(as_expression(other), -1))
+
+    def __rtruediv__(self, other: Number) -> Expression:
+        return mul(as_expression(other), power(self, -1))
+
+    def __pow__(self, exponent: Expression | Number) -> Expression:
+        return power(self, exponent)
+
+    def __neg__(self) -> Expression:
+        return neg(self)
+
+    @property
+    def is_zero(self) -> bool:
+        """Whether this is the literal number 0 (not: whether it simplifies to 0)."""
+        return self.op == "number" and self.value == 0
+
+    @property
+    def is_number(self) -> bool:
+        """Whether this is a literal rational number."""
+        return self.op == "number"
+
+    def __str__(self) -> str:
+        return text(self)
+
+    def __repr__(self) -> str:
+        return f"<{text(self)}>"
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _node, (self.op, self.args, self.value)
+
+
+def _node(op: str, args: tuple[Expression, ...] = (), value: Any = None) -> Expression:
+    key = (op, value, *map(id, args))
+    found = _NODES.get(key)
+    if found is not None:
+        return found
+    node = Expression.__new__(Expression)
+    node.op, node.args, node.value = op, args, value
+    node.depth = 1 + max((a.depth for a in args), default=0)
+    # A hash of the content, equal in every process: the order of commuting factors rests on it.
+    head = f"{op}|{value}".encode()
+    node.digest = blake2b(b"|".join([head, *(a.digest for a in args)]), digest_size=10).digest()
+    _NODES[key] = node
+    return node
+
+
+def natural_key(name: str) -> tuple[tuple[int, int | str], ...]:
+    """Sort key that puts ``x2`` before ``x10``."""
+    return tuple((0, int(t)) if t.isdigit() else (1, t) for t in re.findall(r"\d+|\D+", name))
+
+
+def _commuting_key(e: Expression) -> tuple[Any, ...]:
+    name = natural_key(e.value) if e.op == "symbol" else ()
+    return (_RANK.get(e.op, 3), name, e.depth, e.digest)
+
+
+def number(value: Number) -> Expression:
+    """A literal rational number."""
+    return _node("number", (), Fraction(value))
+
+
+def symbol(name: str) -> Expression:
+    """The symbol of that name; two symbols are the same if and only if their names are."""
+    return _node("symbol", (), name)
+
+
+def as_expression(value: Expression | Number) -> Expression:
+    """``value`` itself, or the number it is."""
+    return value if isinstance(value, Expression) else number(value)
+
+
+ZERO = number(0)
+ONE = number(1)
+PI = _node("pi")
+EULER = _node("E")
+
+
+def add(a: Expression, b: Expression) -> Expression:
+    """a + b."""
+    if a.is_zero:
+        return b
+    if b.is_zero:
+        return a
+    if a.is_number and b.is_number:
+        return number(a.value + b.value)
+    if b.op == "neg":
+        return sub(a, b.args[0])
+    if a.op == "neg":
+        return sub(b, a.args[0])
+    if _commuting_key(b) < _commuting_key(a):
+        a, b = b, a
+    return _node("add", (a, b))
+
+
+def sub(a: Expression, b: Expression) -> Expression:
+    """a − b."""
+    if b.is_zero:
+        return a
+    if a is b:
+        return ZERO
+    if a.is_zero:
+        return neg(b)
+    if a.is_number and b.is_number:
+        return number(a.value - b.value)
+    if b.op == "neg":
+        return add(a, b.args[0])
+    if a.op == "neg":
+        return neg(add(a.args[0], b))
+    if b.is_number and b.value < 0:
+        return add(a, number(-b.value))
+    return _node("sub", (a, b))
+
+
+def neg(a: Expression) -> Expression:
+    """−a."""
+    if a.is_number:
+        return number(-a.value)
+    if a.op == "neg":
+        return a.args[0]
+    if a.op == "sub":
+        return sub(a.args[1], a.args[0])
+    if a.op == "mul" and a.args[0].is_number:
+        return mul(number(-a.args[0].value), a.args[1])
+    return _node("neg", (a,))
+
+
+def mul(a: Expression, b: Expression) -> Expression:
+    """a · b."""
+    if a.is_number and b.is_number:
+        return number(a.value * b.value)
+    if b.is_number:
+        a, b = b, a
+    if a.is_number:
+        if a.value == 0:
+            return ZERO
+        if a.value == 1:
+            return b
+        if b.op == "neg":
+            return mul(number(-a.value), b.args[0])
+        if b.op == "mul" and b.args[0].is_number:
+            return mul(number(a.value * b.args[0].value), b.args[1])
+        if a.value == -1:
+            return neg(b)
+        return _node("mul", (a, b))
+    if a.op == "neg":
+        return neg(mul(a.args[0], b))
+    if b.op == "neg":
+        return neg(mul(a, b.args[0]))
+    # A number is kept outermost, so that it meets the numbers of later factors.
+    if a.op == "mul" and a.args[0].is_number:
+        return mul(a.args[0], mul(a.args[1], b))
+    if b.op == "mul" and b.args[0].is_number:
+        return mul(b.args[0], mul(a, b.args[1]))
+    if a is b:
+        return power(a, 2)
+    if a.op == "pow" and a.args[0] is b:
+        return power(b, a.value + 1)
+    if b.op == "pow" and b.args[0] is a:
+        return power(a, b.value + 1)
+    if a.op == "pow" and b.op == "pow" and a.args[0] is b.args[0]:
+        return power(a.args[0], a.value + b.value)
+    if _commuting_key(b) < _commuting_key(a):
+        a, b = b, a
+    return _node("mul", (a, b))
+
+
+def power(base: Expression, exponent: Expression | Number) -> Expression:
+    """base ** exponent; an exponent that is not a rational number makes a ``power`` call."""
+    if isinstance(exponent, Expression):
+        if not exponent.is_number:
+            return call("power", base, exponent)
+        exponent = exponent.value
+    exponent = Fraction(exponent)
+    if exponent == 0:
+        return ONE
+    if exponent == 1:
+        return base
+    integer = exponent.denominator == 1
+    if base.is_number:
+        if base.value == 1:
+            return ONE
+        if integer and (base.value != 0 or exponent > 0):
+            return number(base.value ** int(exponent))
+        if base.value == 0 and exponent > 0:
+            return ZERO
+    if integer and base.op == "pow":
+        return power(base.args[0], base.value * exponent)
+    if integer and base.op == "neg":
+        inner = power(base.args[0], exponent)
+        return inner if exponent % 2 == 0 else neg(inner)
+    if integer and base.op == "mul" and base.args[0].is_number:
+        return mul(power(base.args[0], exponent), power(base.args[1], exponent))
+    return _node("pow", (base,), exponent)
+
+
+def sqrt(a: Expression) -> Expression:
+    """The square root, as a power of exponent ½."""
+    return power(a, Fraction(1, 2))
+
+
+def call(function: str, *args: Expression) -> Expression:
+    """function(args), for a name in `FUNCTIONS`; values that are rational at 0 and 1 are folded."""
+    if FUNCTIONS[function] != len(args):
+        raise ValueError(f"{function} takes {FUNCTIONS[function]} argument(s), not {len(args)}")
+    first = args[0]
+    if len(args) == 1 and first.is_zero:
+        if function in ("exp", "cos", "cosh"):
+            return ONE
+        if function not in ("log", "acos", "acosh"):
+            return ZERO
+    if function == "log" and first is ONE:
+        return ZERO
+    if function in ("abs", "sign") and first.is_number:
+        return number(abs(first.value) if function == "abs" else (first.value > 0) - (first.value < 0))
+    return _node(function, args)
+
+
+def total(terms: Iterable[Expression]) -> Expression:
+    """The sum of the terms, as a balanced tree: less rounding error and more parallelism than a chain."""
+    return _balanced(add, list(terms), ZERO)
+
+
+def product(factors: Iterable[Expression]) -> Expression:
+    """The product of the factors, as a balanced tree."""
+    return _balanced(mul, list(factors), ONE)
+
+
+def _balanced(
+    combine: Callable[[Expression, Expression], Expression], items: list[Expression], empty: Expression
+) -> Expression:
+    if not items:
+        return empty
+    while len(items) > 1:
+        pairs = [combine(items[i], items[i + 1]) for i in range(0, len(items) - 1, 2)]
+        items = pairs + (items[-1:] if len(items) % 2 else [])
+    return items[0]
+
+
+def topological(roots: Iterable[Expression]) -> list[Expression]:
+    """All nodes below the roots, arguments before what uses them; the order depends on the content only."""
+    order: list[Expression] = []
+    done: set[int] = set()
+    for root in roots:
+        stack = [(root, False)]
+        while stack:
+            node, expanded = stack.pop()
+            if id(node) in done:
+                continue
+            if expanded:
+                done.add(id(node))
+                order.append(node)
+            else:
+                stack.append((node, True))
+                stack.extend((a, False) for a in reversed(node.args) if id(a) not in done)
+    return order
+
+
+def symbols_of(*roots: Expression) -> list[str]:
+    """The names of the symbols below the roots, sorted."""
+    return sorted({e.value for e in topological(roots) if e.op == "symbol"}, key=natural_key)
+
+
+def fold(roots: Sequence[Expression], visit: Callable[[Expression, list[T]], T]) -> list[T]:
+    """Values of the roots, where ``visit(node, values_of_its_arguments)`` gives the value of a node.
+
+    Every walk over expressions (substitution, evaluation, conversion, printing) is a call of this one;
+    a shared node is visited once.
+    """
+    values: dict[int, T] = {}
+    for node in topological(roots):
+        values[id(node)] = visit(node, [values[id(a)] for a in node.args])
+    return [values[id(r)] for r in roots]
+
+
+def rebuild(node: Expression, args: Sequence[Expression]) -> Expression:
+    """The node with other arguments, simplified anew."""
+    if not node.args:
+        return node
+    match node.op:
+        case "add":
+            return add(*args)
+        case "sub":
+            return sub(*args)
+        case "neg":
+            return neg(*args)
+        case "mul":
+            return mul(*args)
+        case "pow":
+            return power(args[0], node.value)
+        case "power":
+            return power(args[0], args[1])
+    return call(node.op, *args)
+
+
+def substitute(roots: Sequence[Expression], values: Mapping[str, Expression]) -> list[Expression]:
+    """The roots with symbols replaced, all at once."""
+
+    def visit(node: Expression, args: list[Expression]) -> Expression:
+        if node.op == "symbol":
+            return values.get(node.value, node)
+        return rebuild(node, args)
+
+    return fold(roots, visit)
+
+
+def partials(e: Expression) -> list[Expression]:
+    """Partial derivatives of a node with respect to its arguments."""
+    if not e.args:
+        return []
+    a = e.args[0]
+    match e.op:
+        case "add":
+            return [ONE, ONE]
+        case "sub":
+            return [ONE, number(-1)]
+        case "neg":
+            return [number(-1)]
+        case "mul":
+            return [e.args[1], a]
+        case "pow":
+            return [e.value * power(a, e.value - 1)]
+        case "power":
+            return [e * e.args[1] / a, e * call("log", a)]
+        case "exp":
+            return [e]
+        case "log":
+            return [1 / a]
+        case "sin":
+            return [call("cos", a)]
+        case "cos":
+            return [-call("sin", a)]
+        case "tan":
+            return [1 + e**2]
+        case "asin":
+            return [power(1 - a**2, Fraction(-1, 2))]
+        case "acos":
+            return [-power(1 - a**2, Fraction(-1, 2))]
+        case "atan":
+            return [1 / (1 + a**2)]
+        case "atan2":
+            radius = 1 / (a**2 + e.args[1] ** 2)
+            return [e.args[1] * radius, -a * radius]
+        case "sinh":
+            return [call("cosh", a)]
+        case "cosh":
+            return [call("sinh", a)]
+        case "tanh":
+            return [1 - e**2]
+        case "asinh":
+            return [power(1 + a**2, Fraction(-1, 2))]
+        case "acosh":
+            return [power(a**2 - 1, Fraction(-1, 2))]
+        case "atanh":
+            return [1 / (1 - a**2)]
+        case "abs":
+            return [call("sign", a)]
+        case "sign":
+            return [ZERO]
+    raise ValueError(f"no derivative is known for {e.op}")
+
+
+def derivatives(roots: Sequence[Expression], name: str) -> list[Expression]:
+    """d root / d name for each root, by forward accumulation."""
+
+    def visit(node: Expression, args: list[tuple[Expression, Expression]]) -> tuple[Expression, Expression]:
+        if node.op == "symbol":
+            return node, ONE if node.value == name else ZERO
+        if all(d.is_zero for _, d in args):
+            return node, ZERO
+        terms = [partial * d for partial, (_, d) in zip(partials(node), args, strict=True) if not d.is_zero]
+        return node, reduce(add, terms)
+
+    return [d for _, d in fold(roots, visit)]
+
+
+def derivative(e: Expression, name: str) -> Expression:
+    """de / d name."""
+    return derivatives([e], name)[0]
+
+
+def gradient(e: Expression, names: Sequence[str]) -> list[Expression]:
+    """Derivatives of one expression with respect to many symbols, by reverse accumulation."""
+    order = topological([e])
+    wanted = set(names)
+    active: set[int] = set()
+    for node in order:
+        if (node.op == "symbol" and node.value in wanted) or any(id(a) in active for a in node.args):
+            active.add(id(node))
+    contributions: dict[int, list[Expression]] = {id(e): [ONE]}
+    adjoint_of: dict[str, Expression] = {}
+    for node in reversed(order):
+        if id(node) not in active:
+            continue
+        adjoint = total(contributions.pop(id(node), []))
+        if node.op == "symbol":
+            adjoint_of[node.value] = adjoint
+        elif not adjoint.is_zero:
+            for partial, a in zip(partials(node), node.args, strict=True):
+                if id(a) in active:
+                    contributions.setdefault(id(a), []).append(adjoint * partial)
+    return [adjoint_of.get(n, ZERO) for n in names]
+
+
+_PRECEDENCE = {"add": 1, "sub": 1, "neg": 1, "mul": 2, "pow": 3}
+
+
+def text(e: Expression) -> str:
+    """The expression in the syntax of a spec; parsing it gives an equal expression.
+
+    Meant for messages: a shared sub-expression is written out wherever it occurs, and what would be
+    longer than 2,000 characters is cut with an ellipsis.
+    """
+
+    def wrap(part: tuple[str, int], level: int) -> str:
+        return part[0] if part[1] >= level else f"({part[0]})"
+
+    def visit(node: Expression, args: list[tuple[str, int]]) -> tuple[str, int]:
+        match node.op:
+            case "number":
+                whole = node.value.denominator == 1
+                return str(node.value), (4 if whole and node.value >= 0 else 2 if node.value > 0 else 1)
+            case "symbol":
+                return node.value, 4
+            case "pi" | "E":
+                return node.op, 4
+            case "add":
+                out = f"{wrap(args[0], 1)} + {wrap(args[1], 2)}", 1
+            case "sub":
+                out = f"{wrap(args[0], 1)} - {wrap(args[1], 2)}", 1
+            case "neg":
+                out = f"-{wrap(args[0], 2)}", 1
+            case "mul":
+                if node.args[1].op == "pow" and node.args[1].value == -1:
+                    divisor = node.args[1].args[0]
+                    written = text(divisor)
+                    out = f"{wrap(args[0], 2)}/{written if divisor.op in ('symbol', 'number') else f'({written})'}", 2
+                else:
+                    out = f"{wrap(args[0], 2)}*{wrap(args[1], 3)}", 2
+            case "pow":
+                if node.value == Fraction(1, 2):
+                    out = f"sqrt({args[0][0]})", 4
+                elif node.value == -1:
+                    out = f"1/{wrap(args[0], 4)}", 2
+                elif node.value.denominator == 1 and node.value > 0:
+                    out = f"{wrap(args[0], 4)}**{node.value}", 3
+                else:
+                    out = f"{wrap(args[0], 4)}**({node.value})", 3
+            case "power":
+                out = f"{wrap(args[0], 4)}**({args[1][0]})", 3
+            case _:
+                out = f"{node.op}({', '.join(a for a, _ in args)})", 4
+        return (out[0], out[1]) if len(out[0]) <= 2000 else ("…", 4)
+
+    return fold([e], visit)[0][0]

@@ -1,0 +1,193 @@
+"""Truncated power series in t of a composed expression, level by level.
+
+A `Taylor` holds the series of every node of an expression graph whose symbols are themselves series.
+Coefficients live in any ring that offers ``constant``, ``function`` and ``power``: a `Tower`
+(polynomials), or `ExpressionRing` (shared expression graphs). Levels are computed one at a time, so the
+coefficients of a symbol at level i may depend on the result at level i−1: that is what lets the
+Hamilton–Jacobi recursion compute each coefficient once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+from typing import Any, Protocol
+
+from phigen.symbolic.expression import (
+    EULER,
+    PI,
+    ZERO,
+    Expression,
+    call,
+    number,
+    partials,
+    power,
+    symbol,
+    topological,
+    total,
+)
+
+
+class Ring(Protocol):
+    """What a ring of coefficients offers besides + − *."""
+
+    def constant(self, value: int | Fraction) -> Any:
+        """A rational number as an element."""
+
+    def variable(self, name: str) -> Any:
+        """A symbol as an element."""
+
+    def function(self, name: str, args: list[Any]) -> Any:
+        """An elementary function (or ``constant:pi``, ``constant:E`` with no arguments)."""
+
+    def power(self, base: Any, exponent: Fraction | int) -> Any:
+        """A rational power."""
+
+    def combine(self, terms: list[Any]) -> Any:
+        """The sum of the terms."""
+
+    def vanishes(self, element: Any) -> bool:
+        """Whether the element is 0 in its own form (no relations used)."""
+
+
+class ExpressionRing:
+    """The ring of expression graphs: no expansion, sub-expressions shared."""
+
+    def constant(self, value: int | Fraction) -> Expression:
+        """A literal number."""
+        return number(value)
+
+    def variable(self, name: str) -> Expression:
+        """A symbol."""
+        return symbol(name)
+
+    def function(self, name: str, args: list[Expression]) -> Expression:
+        """A call, or one of the constants."""
+        if name.startswith("constant:"):
+            return PI if name.endswith("pi") else EULER
+        return call(name, *args)
+
+    def power(self, base: Expression, exponent: Fraction | int) -> Expression:
+        """A power node."""
+        return power(base, exponent)
+
+    def combine(self, terms: list[Expression]) -> Expression:
+        """A balanced sum."""
+        return total(terms)
+
+    def vanishes(self, element: Expression) -> bool:
+        """Whether it is the literal 0."""
+        return element is ZERO
+
+
+def closure(roots: Sequence[Expression]) -> list[Expression]:
+    """Nodes in the order of evaluation: those of the roots, and the derivatives that function nodes need."""
+    wanted = list(roots)
+    while True:
+        order = topological(wanted)
+        present = {id(e) for e in order}
+        new = [d for e in order if _by_derivative(e) for d in partials(e) if id(d) not in present]
+        if not new:
+            return order
+        wanted += new
+
+
+def _by_derivative(e: Expression) -> bool:
+    return bool(e.args) and e.op not in ("add", "sub", "neg", "mul", "pow")
+
+
+class Taylor:
+    """Series in t of the nodes of some expressions; ``series[id(node)]`` lists the coefficients so far."""
+
+    def __init__(self, roots: Sequence[Expression], ring: Ring, variable_symbols: Sequence[str]) -> None:
+        self.ring = ring
+        self.order = closure(roots)
+        self.moving = set(variable_symbols)
+        self.series: dict[int, list[Any]] = {id(e): [] for e in self.order}
+        self._zero = ring.constant(0)
+
+    def coefficients(self, e: Expression) -> list[Any]:
+        """The coefficients of a node, as far as they are known."""
+        return self.series[id(e)]
+
+    def advance(self, inputs: dict[str, Any]) -> None:
+        """Compute the next level of all nodes; ``inputs`` gives that of the moving symbols."""
+        for e in self.order:
+            own = self.series[id(e)]
+            own.append(self._coefficient(e, len(own), inputs))
+
+    def _coefficient(self, e: Expression, i: int, inputs: dict[str, Any]) -> Any:
+        if not e.args:
+            if e.op == "symbol" and e.value in self.moving:
+                return inputs[e.value]
+            return self._constant(e) if i == 0 else self._zero
+        args = [self.series[id(a)] for a in e.args]
+        match e.op:
+            case "add":
+                return args[0][i] + args[1][i]
+            case "sub":
+                return args[0][i] - args[1][i]
+            case "neg":
+                return -args[0][i]
+            case "mul":
+                return self._convolve(args[0], args[1], i)
+            case "pow":
+                return self._power(e, args[0], i)
+        return self._function(e, args, i)
+
+    def _constant(self, e: Expression) -> Any:
+        if e.op == "number":
+            return self.ring.constant(e.value)
+        if e.op == "symbol":
+            return self.ring.variable(e.value)
+        return self.ring.function("constant:" + e.op, [])
+
+    def _convolve(self, a: list[Any], b: list[Any], i: int) -> Any:
+        zero = self.ring.vanishes
+        if a is b:
+            pairs = [a[j] * a[i - j] * self.ring.constant(2) for j in range((i + 1) // 2) if not zero(a[j])]
+            return self.ring.combine(pairs + ([a[i // 2] * a[i // 2]] if i % 2 == 0 else []))
+        return self.ring.combine(
+            [a[j] * b[i - j] for j in range(i + 1) if not (zero(a[j]) or zero(b[i - j]))]
+        )
+
+    def _power(self, e: Expression, a: list[Any], i: int) -> Any:
+        exponent: Fraction = e.value
+        if exponent.denominator == 1 and exponent > 0:
+            return self._integer_power(a, int(exponent), i)
+        if i == 0:
+            return self.ring.power(a[0], exponent)
+        # c = a**r satisfies a·c' = r·a'·c.
+        own, zero = self.series[id(e)], self.ring.vanishes
+        terms = [
+            a[j] * own[i - j] * self.ring.constant((exponent * j - (i - j)) / i)
+            for j in range(1, i + 1)
+            if not (zero(a[j]) or zero(own[i - j]))
+        ]
+        return self.ring.combine(terms) * self.ring.power(a[0], -1)
+
+    def _integer_power(self, a: list[Any], n: int, i: int) -> Any:
+        if n == 1:
+            return a[i]
+        if n == 2:
+            return self._convolve(a, a, i)
+        half = [self._integer_power(a, n // 2, j) for j in range(i + 1)]
+        if n % 2 == 0:
+            return self._convolve(half, half, i)
+        squared = [self._convolve(half, half, j) for j in range(i + 1)]
+        return self._convolve(squared, a, i)
+
+    def _function(self, e: Expression, args: list[list[Any]], i: int) -> Any:
+        if i == 0:
+            return self.ring.function(e.op, [a[0] for a in args])
+        # c = f(a) satisfies c' = Σ ∂f/∂a_k(a) · a_k', and the partial derivatives are nodes themselves.
+        zero = self.ring.vanishes
+        terms = []
+        for partial, a in zip(partials(e), args, strict=True):
+            d = self.series[id(partial)]
+            terms += [
+                a[j] * d[i - j] * self.ring.constant(Fraction(j, i))
+                for j in range(1, i + 1)
+                if not (zero(a[j]) or zero(d[i - j]))
+            ]
+        return self.ring.combine(terms)

@@ -1,0 +1,383 @@
+"""The differential ring in which phigen computes: polynomials over Q in symbols and in function values.
+
+A non-polynomial function of the data (``exp(x)``, ``1/(x**2+1)``, ``sqrt(l)`` …) is one more variable of the
+ring, a *generator*, whose derivatives are again elements of the ring. Geometry and series thus stay in
+one fast polynomial arithmetic whatever the Hamiltonian is. The price is that generators satisfy
+relations (r·f = 1, w² = q, sin² + cos² = 1 …); `Tower.is_zero` eliminates them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+from typing import Any
+
+from flint import Ordering, fmpq, fmpq_mpoly_ctx
+
+from phigen.symbolic.expression import EULER, ONE, PI, Expression, call, derivatives, fold, number, power, symbol
+from phigen.symbolic.horner import horner
+
+#: An element of a tower: ``flint.fmpq_mpoly``. Elements of different towers do not mix.
+Poly = Any
+
+
+@dataclass
+class Generator:
+    """A function value as a variable of the ring.
+
+    ``kind`` is the function's name, ``constant`` (pi, E), ``reciprocal`` (1/argument, the argument
+    irreducible) or ``root`` (argument**(±1/degree)).
+    """
+
+    name: str
+    kind: str
+    arguments: list[Poly]
+    expression: Expression
+    degree: int = 1
+    inverse: bool = False
+    derivative: dict[str, Poly] = field(default_factory=dict)
+
+
+class _Missing(Exception):
+    """A generator that the ring does not have yet."""
+
+    def __init__(self, kind: str, arguments: list[Poly], degree: int = 1, inverse: bool = False) -> None:
+        self.kind, self.arguments, self.degree, self.inverse = kind, arguments, degree, inverse
+
+
+class Tower:
+    """The ring Q[symbols, generators] that holds the given expressions and their derivatives.
+
+    ``symbols`` are the polynomial variables, ``expressions`` what must be representable, and
+    ``variables`` the symbols with respect to which the ring is closed under differentiation.
+    """
+
+    def __init__(
+        self, symbols: Sequence[str], expressions: Iterable[Expression] = (), variables: Sequence[str] = ()
+    ) -> None:
+        self.symbols = tuple(symbols)
+        self.variables = tuple(variables)
+        self.generators: list[Generator] = []
+        self._set_context()
+        for e in expressions:
+            self._absorb(e)
+        self._close()
+
+    # -- the ring ---------------------------------------------------------------------------------
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the ring's variables: the symbols, then the generators."""
+        return self.symbols + tuple(g.name for g in self.generators)
+
+    def _set_context(self) -> None:
+        self.context = fmpq_mpoly_ctx.get([f"v{i}" for i in range(len(self.names))] or ["v0"], Ordering.degrevlex)
+        self.gens = self.context.gens()
+        self._index = {n: i for i, n in enumerate(self.names)}
+
+    def constant(self, value: int | Fraction) -> Poly:
+        """The rational number as an element."""
+        value = Fraction(value)
+        return self.context.constant(fmpq(value.numerator, value.denominator))
+
+    def variable(self, name: str) -> Poly:
+        """The symbol or generator of that name."""
+        return self.gens[self._index[name]]
+
+    @property
+    def zero(self) -> Poly:
+        """0."""
+        return self.constant(0)
+
+    # -- growing ----------------------------------------------------------------------------------
+
+    def _absorb(self, e: Expression) -> Poly:
+        while True:
+            try:
+                return self._convert(e)
+            except _Missing as missing:
+                self._grow(missing)
+
+    def _grow(self, missing: _Missing) -> None:
+        name = f"g:{len(self.generators)}"
+        arguments = [self.expression(a) for a in missing.arguments]
+        self.generators.append(
+            Generator(
+                name,
+                missing.kind,
+                missing.arguments,
+                _generator_expression(missing.kind, arguments, missing.degree, missing.inverse),
+                missing.degree,
+                missing.inverse,
+            )
+        )
+        self._set_context()
+        for g in self.generators:
+            g.arguments = [self._lift(a) for a in g.arguments]
+            g.derivative = {v: self._lift(d) for v, d in g.derivative.items()}
+
+    def _lift(self, element: Poly) -> Poly:
+        size = len(self.names)
+        return self.context.from_dict(
+            {m + (0,) * (size - len(m)) if len(m) < size else m[:size]: c for m, c in element.to_dict().items()}
+        )
+
+    def _close(self) -> None:
+        """Add generators until the derivative of each is in the ring."""
+        done = 0
+        while done < len(self.generators):
+            for v in self.variables:
+                (rule,) = derivatives([self.generators[done].expression], v)
+                value = self._absorb(rule)
+                self.generators[done].derivative[v] = value
+            done += 1
+
+    # -- conversion -------------------------------------------------------------------------------
+
+    def convert(self, e: Expression) -> Poly:
+        """The expression as an element; ValueError if it needs a function that the tower does not have."""
+        return self.convert_all([e])[0]
+
+    def convert_all(self, expressions: Sequence[Expression]) -> list[Poly]:
+        """`convert` for several expressions that share parts."""
+        try:
+            return fold(expressions, self._visit)
+        except _Missing as missing:
+            raise ValueError(f"the ring has no generator for {missing.kind}") from None
+
+    def _convert(self, e: Expression) -> Poly:
+        return fold([e], self._visit)[0]
+
+    def _visit(self, e: Expression, args: list[Poly]) -> Poly:
+        match e.op:
+            case "number":
+                return self.constant(e.value)
+            case "symbol":
+                return self.variable(e.value)
+            case "add":
+                return args[0] + args[1]
+            case "sub":
+                return args[0] - args[1]
+            case "neg":
+                return -args[0]
+            case "mul":
+                return args[0] * args[1]
+            case "pow":
+                return self.power(args[0], e.value)
+            case "pi" | "E":
+                return self.function("constant:" + e.op, [])
+            case _:
+                return self.function(e.op, args)
+
+    def function(self, name: str, args: list[Poly]) -> Poly:
+        """A function of elements, where the tower has it (used for constant terms of series)."""
+        if name.startswith("constant:"):
+            return self._generator(name, [])
+        if name == "abs":
+            return self.function("sign", args) * args[0]
+        first = args[0]
+        if len(args) == 1 and first.is_constant() and first == 0 and name in ("exp", "cos", "cosh"):
+            return self.constant(1)
+        if len(args) == 1 and first.is_constant() and first == 0 and name not in ("log", "acos", "acosh"):
+            return self.zero
+        if name == "log" and first == 1:
+            return self.zero
+        if name == "exp":
+            for g in self.generators:
+                if g.kind == "exp" and (ratio := _ratio(first, g.arguments[0])) and ratio > 0 and ratio.denominator == 1:
+                    return self.variable(g.name) ** int(ratio)
+        return self._generator(name, args)
+
+    def power(self, base: Poly, exponent: Fraction | int) -> Poly:
+        """base ** exponent for a rational exponent."""
+        exponent = Fraction(exponent)
+        if exponent.denominator == 1:
+            n = int(exponent)
+            return base**n if n >= 0 else self._reciprocal(base) ** (-n)
+        if base.is_constant() and (root := _rational_root(base, exponent.denominator)) is not None:
+            return self.constant(root**exponent.numerator)
+        n, k = exponent.denominator, exponent.numerator
+        if k < 0:
+            return self._generator("root", [base], n, True) ** (-k)
+        return base ** (k // n) * self._generator("root", [base], n, False) ** (k % n)
+
+    def _reciprocal(self, base: Poly) -> Poly:
+        if base == 0:
+            raise ZeroDivisionError("reciprocal of zero")
+        for g in self.generators:
+            if g.kind == "root" and g.inverse and (ratio := _ratio(base, g.arguments[0])):
+                return self.variable(g.name) ** g.degree * self.constant(1 / ratio)
+        content, factors = base.factor()
+        result = self.context.constant(1 / content)
+        for f, multiplicity in factors:
+            result *= self._inverse_of_factor(f) ** int(multiplicity)
+        return result
+
+    def _inverse_of_factor(self, f: Poly) -> Poly:
+        for g in self.generators:
+            if g.kind == "root" and g.inverse and (ratio := _ratio(f, g.arguments[0])):
+                return self.variable(g.name) ** g.degree * self.constant(1 / ratio)
+            if g.kind == "root" and f == self.variable(g.name):
+                return self._generator("root", g.arguments, g.degree, not g.inverse)
+            if g.kind == "reciprocal" and f == self.variable(g.name):
+                return g.arguments[0]
+            if g.kind == "exp" and f == self.variable(g.name):
+                return self._generator("exp", [-g.arguments[0]])
+        return self._generator("reciprocal", [f])
+
+    def _generator(self, kind: str, args: list[Poly], degree: int = 1, inverse: bool = False) -> Poly:
+        for g in self.generators:
+            if g.kind == kind and g.degree == degree and g.inverse == inverse and g.arguments == args:
+                return self.variable(g.name)
+        raise _Missing(kind, args, degree, inverse)
+
+    def expression(self, element: Poly) -> Expression:
+        """The element as an expression, in Horner form, generators written out."""
+        return self.expression_in(element, {})
+
+    def expression_in(self, element: Poly, values: Mapping[str, Expression]) -> Expression:
+        """`expression` with some of the ring's variables replaced."""
+        variables = [values.get(n, symbol(n)) for n in self.symbols]
+        variables += [values.get(g.name, g.expression) for g in self.generators]
+        terms = {_exponents(m): number(rational(c)) for m, c in element.to_dict().items()}
+        return horner({m[: len(variables)]: c for m, c in terms.items()}, variables)
+
+    # -- calculus ---------------------------------------------------------------------------------
+
+    def derivative(self, element: Poly, name: str) -> Poly:
+        """Total derivative with respect to one of `variables`, through the generators."""
+        result = element.derivative(self._index[name])
+        for g in self.generators:
+            chain = g.derivative[name]
+            if chain != 0:
+                partial = element.derivative(self._index[g.name])
+                if partial != 0:
+                    result += partial * chain
+        return result
+
+    def depends_on(self, element: Poly, names: Iterable[str]) -> bool:
+        """Whether some of the symbols occur, directly or inside a generator."""
+        wanted = set(names)
+        degrees = element.degrees()
+        for i, n in enumerate(self.names):
+            if degrees[i] and (n in wanted or (i >= len(self.symbols) and self._generator_uses(i, wanted))):
+                return True
+        return False
+
+    def _generator_uses(self, index: int, wanted: set[str]) -> bool:
+        g = self.generators[index - len(self.symbols)]
+        return any(self.depends_on(a, wanted) for a in g.arguments)
+
+    # -- deciding ---------------------------------------------------------------------------------
+
+    def is_zero(self, element: Poly) -> bool:
+        """True proves that the element vanishes identically; False only that it did not reduce to 0."""
+        return bool(self.numerator(element) == 0)
+
+    def numerator(self, element: Poly) -> Poly:
+        """A multiple of the element by a non-vanishing function, with relations between generators used up."""
+        for g in reversed(self.generators):
+            element = self._eliminate(element, g)
+        return element
+
+    def _eliminate(self, element: Poly, g: Generator) -> Poly:
+        parts = self._parts(element, g.name)
+        if set(parts) <= {0}:
+            return element
+        if g.kind == "reciprocal":
+            top = max(parts)
+            return self.combine(c * g.arguments[0] ** (top - e) for e, c in parts.items())
+        if g.kind == "root":
+            return self._eliminate_root(parts, g)
+        partner = {"sin": "cos", "cosh": "sinh"}.get(g.kind)
+        if g.kind == "sign":
+            return self.combine(c * self.variable(g.name) ** (e % 2) for e, c in parts.items())
+        if g.kind == "exp":
+            for other in self.generators:
+                if other is not g and other.kind == "exp" and other.arguments[0] == -g.arguments[0]:
+                    top, w = max(parts), self.variable(other.name)
+                    return self.combine(c * w ** (top - e) for e, c in parts.items())
+        if partner:
+            for other in self.generators:
+                if other.kind == partner and other.arguments == g.arguments:
+                    square = 1 - self.variable(other.name) ** 2 if g.kind == "sin" else 1 + self.variable(other.name) ** 2
+                    own = self.variable(g.name)
+                    return self.combine(c * own ** (e % 2) * square ** (e // 2) for e, c in parts.items())
+        return element
+
+    def _eliminate_root(self, parts: dict[int, Poly], g: Generator) -> Poly:
+        base, n, own = g.arguments[0], g.degree, self.variable(g.name)
+        for other in self.generators:
+            if other.kind == "root" and other.degree == n and other.arguments == g.arguments and other is not g:
+                # w·v = 1: multiplied by a power of the partner, g disappears.
+                if self._index[other.name] < self._index[g.name]:
+                    top, w = max(parts), self.variable(other.name)
+                    return self.combine(c * w ** (top - e) for e, c in parts.items())
+        if not g.inverse:
+            return self.combine(c * own ** (e % n) * base ** (e // n) for e, c in parts.items())
+        top = max(e // n for e in parts)
+        return self.combine(c * own ** (e % n) * base ** (top - e // n) for e, c in parts.items())
+
+    def _parts(self, element: Poly, name: str) -> dict[int, Poly]:
+        i = self._index[name]
+        groups: dict[int, dict[tuple[int, ...], Any]] = {}
+        for m, c in element.to_dict().items():
+            groups.setdefault(int(m[i]), {})[(*m[:i], 0, *m[i + 1 :])] = c
+        return {e: self.context.from_dict(d) for e, d in groups.items()}
+
+    def combine(self, terms: Iterable[Poly]) -> Poly:
+        """The sum of the terms."""
+        result = self.zero
+        for t in terms:
+            result += t
+        return result
+
+    def vanishes(self, element: Poly) -> bool:
+        """Whether the element is 0 as a polynomial (no relations used)."""
+        return bool(element == 0)
+
+
+def rational(c: Any) -> Fraction:
+    """A flint rational as a Fraction."""
+    return Fraction(int(c.p), int(c.q))
+
+
+def _exponents(m: Iterable[Any]) -> tuple[int, ...]:
+    return tuple(int(e) for e in m)
+
+
+def _ratio(a: Poly, b: Poly) -> Fraction | None:
+    """a/b if that is a rational number."""
+    if a == 0 or b == 0 or len(a) != len(b):
+        return None
+    r = a.leading_coefficient() / b.leading_coefficient()
+    return rational(r) if a == b * r else None
+
+
+def _rational_root(base: Poly, degree: int) -> Fraction | None:
+    value = rational(base.leading_coefficient()) if base != 0 else Fraction(0)
+    if value < 0:
+        return None
+    top, bottom = (_integer_root(v, degree) for v in (value.numerator, value.denominator))
+    return Fraction(top, bottom) if top is not None and bottom is not None else None
+
+
+def _integer_root(value: int, degree: int) -> int | None:
+    low, high = 0, value + 1
+    while high - low > 1:
+        middle = (low + high) // 2
+        low, high = (middle, high) if middle**degree <= value else (low, middle)
+    return low if low**degree == value else None
+
+
+def _generator_expression(kind: str, args: list[Expression], degree: int, inverse: bool) -> Expression:
+    if kind == "constant:pi":
+        return PI
+    if kind == "constant:E":
+        return EULER
+    if kind == "reciprocal":
+        return ONE / args[0]
+    if kind == "root":
+        return power(args[0], Fraction(-1 if inverse else 1, degree))
+    return call(kind, *args)
