@@ -1,0 +1,64 @@
+# Two commands to start with:
+#
+#   make demo    compile a system, integrate it, print what was conserved
+#   make test    everything that must hold before a change is merged
+#
+# Both make their own environment in .venv, once. PYTHON=python3.12 chooses the interpreter.
+
+SHELL := /bin/bash
+.SHELLFLAGS := -euo pipefail -c
+.DELETE_ON_ERROR:
+
+VENV := .venv
+BIN := $(VENV)/bin
+STAMP := $(VENV)/.phigen-installed
+WORKERS ?= auto
+
+.PHONY: help demo test lint format golden clean
+
+help:
+	@sed -n '/^#/!q; s/^# \{0,1\}//p' Makefile
+
+demo: $(STAMP)
+	$(BIN)/phigen demo
+
+test: lint
+	$(BIN)/python -m pytest -n $(WORKERS)
+
+lint: $(STAMP)
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+
+format: $(STAMP)
+	$(BIN)/ruff check --fix-only .
+	$(BIN)/ruff format .
+
+# The files in generated/ are examples and golden files at once: read the diff before you commit it.
+golden: $(STAMP)
+	$(BIN)/phigen build specs --output generated
+
+clean:
+	rm -rf $(VENV) build dist
+
+# Installed anew when the dependencies change; an environment that is already there is kept.
+$(STAMP): pyproject.toml
+	@if ! [ -x $(BIN)/python ]; then \
+	  for candidate in $(PYTHON) python3 python3.13 python3.12 python3.11 python; do \
+	    if "$$candidate" -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null; then \
+	      found="$$candidate"; break; \
+	    fi; \
+	  done; \
+	  if [ -z "$${found:-}" ]; then \
+	    echo "error: phigen needs Python 3.11 or newer, and none was found; name one: make PYTHON=/path/to/python3" >&2; \
+	    exit 1; \
+	  fi; \
+	  echo "making $(VENV) with $$("$$found" --version)"; \
+	  if ! "$$found" -m venv $(VENV); then \
+	    rm -rf $(VENV); \
+	    echo "error: $$found cannot make virtual environments; on Debian: apt-get install python3-venv" >&2; \
+	    exit 1; \
+	  fi; \
+	fi
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev,plot]'
+	@touch $@

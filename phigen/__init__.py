@@ -1,0 +1,45 @@
+"""phigen: a compiler from specs of Poisson systems ẋ = π(x)∇H(x) to standalone solvers.
+
+The public names are loaded when they are first used, so that ``import phigen`` and ``phigen --help`` pay
+neither for sympy nor for numpy.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from phigen._version import __version__
+
+if TYPE_CHECKING:
+    from phigen.errors import CheckError, LimitError, PhigenError, SpecError, StepError, ToolchainError
+    from phigen.runtime.solver import Solver
+    from phigen.runtime.trajectory import Trajectory
+
+_HOMES = {
+    "load": "phigen.compiler",
+    "compile": "phigen.compiler",
+    "System": "phigen.system",
+    "Solver": "phigen.runtime.solver",
+    "Trajectory": "phigen.runtime.trajectory",
+    "CheckError": "phigen.errors",
+    "LimitError": "phigen.errors",
+    "PhigenError": "phigen.errors",
+    "SpecError": "phigen.errors",
+    "StepError": "phigen.errors",
+    "ToolchainError": "phigen.errors",
+}
+
+__all__ = ["__version__", *_HOMES]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module 'phigen' has no attribute {name!r}")
+    value = getattr(import_module(_HOMES[name]), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *_HOMES})

@@ -1,0 +1,31 @@
+"""Where the files that are not Python live: in a wheel inside the package, in a checkout beside it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+_PACKAGE = Path(__file__).resolve().parent
+
+
+def templates() -> Path:
+    """The folder of the templates, with one sub-folder per target.
+
+    Raises `FileNotFoundError` if the installation is incomplete.
+    """
+    return _find("templates")
+
+
+def bundled_specs() -> Path:
+    """The folder of the bundled spec files, ``NAME.yaml``.
+
+    Raises `FileNotFoundError` if the installation is incomplete.
+    """
+    return _find("specs")
+
+
+def _find(name: str) -> Path:
+    # The checkout comes second: a wheel must not pick up a stray folder of site-packages.
+    for folder in (_PACKAGE / "_data" / name, _PACKAGE.parent / name):
+        if folder.is_dir():
+            return folder
+    raise FileNotFoundError(f"phigen's folder {name!r} is missing; the installation is incomplete: reinstall phigen")
