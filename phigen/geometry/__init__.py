@@ -1,0 +1,1 @@
+"""Poisson tensors, brackets, Casimirs and Lie algebras."""

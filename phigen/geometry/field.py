@@ -1,0 +1,136 @@
+"""Arithmetic of structure constants: the field Q, or Q(parameters) when parameters occur in them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from fractions import Fraction
+from typing import Any
+
+from flint import Ordering, fmpq, fmpq_mpoly_ctx
+
+from phigen.symbolic.expression import Expression, fold, number, topological
+from phigen.symbolic.horner import horner
+from phigen.symbolic.tower import rational
+
+#: An element of a `Field`: ``flint.fmpq`` or `Ratio`; both know + - * / and comparison with 0.
+Scalar = Any
+
+_ARITHMETIC = frozenset({"number", "symbol", "add", "sub", "neg", "mul"})
+
+
+class Ratio:
+    """A quotient of polynomials over Q in lowest terms, the denominator with leading coefficient 1."""
+
+    __slots__ = ("denominator", "numerator")
+
+    def __init__(self, numerator: Any, denominator: Any) -> None:
+        if denominator == 0:
+            raise ZeroDivisionError("division by zero")
+        common = numerator.gcd(denominator)
+        numerator, denominator = numerator / common, denominator / common
+        leading = denominator.leading_coefficient()
+        self.numerator, self.denominator = numerator / leading, denominator / leading
+
+    def __add__(self, other: Ratio) -> Ratio:
+        return Ratio(
+            self.numerator * other.denominator + other.numerator * self.denominator,
+            self.denominator * other.denominator,
+        )
+
+    def __sub__(self, other: Ratio) -> Ratio:
+        return self + (-other)
+
+    def __neg__(self) -> Ratio:
+        return Ratio(-self.numerator, self.denominator)
+
+    def __mul__(self, other: Ratio) -> Ratio:
+        return Ratio(self.numerator * other.numerator, self.denominator * other.denominator)
+
+    def __truediv__(self, other: Ratio) -> Ratio:
+        return Ratio(self.numerator * other.denominator, self.denominator * other.numerator)
+
+    def __pow__(self, exponent: int) -> Ratio:
+        if exponent < 0:
+            return Ratio(self.denominator**-exponent, self.numerator**-exponent)
+        return Ratio(self.numerator**exponent, self.denominator**exponent)
+
+    def __eq__(self, other: object) -> bool:
+        if isinstance(other, int):
+            return bool(self.numerator == other * self.denominator)
+        return isinstance(other, Ratio) and bool(
+            self.numerator * other.denominator == other.numerator * self.denominator
+        )
+
+    __hash__ = None  # type: ignore[assignment]
+
+
+class Field:
+    """The smallest field Q(symbols) that holds the given expressions.
+
+    A function of parameters (``sqrt(l)``, ``pi``) is one more independent symbol: relations between such
+    functions are not used, so an element that is zero only by one of them is taken for non-zero. Nothing
+    rests on this but which algebraic structure is found; what is built from it is proved in a `Tower`.
+    """
+
+    def __init__(self, expressions: Iterable[Expression] = ()) -> None:
+        roots = list(expressions)
+        self._atoms: list[Expression] = []
+        self._index: dict[int, int] = {}
+        for node in topological(roots):
+            if node.op == "symbol" or (node.op not in _ARITHMETIC and not _integer_power(node)):
+                self._index[id(node)] = len(self._atoms)
+                self._atoms.append(node)
+        self.is_rational = not self._atoms
+        self._context = fmpq_mpoly_ctx.get([f"v{i}" for i in range(len(self._atoms))] or ["v0"], Ordering.degrevlex)
+        self.zero = self.number(0)
+        self.one = self.number(1)
+
+    def number(self, value: int | Fraction) -> Scalar:
+        """The rational number as an element."""
+        value = Fraction(value)
+        found = fmpq(value.numerator, value.denominator)
+        return found if self.is_rational else Ratio(self._context.constant(found), self._context.constant(1))
+
+    def convert(self, e: Expression) -> Scalar:
+        """The expression as an element; KeyError if it needs a symbol that the field does not have."""
+        if e.is_number:
+            return self.number(e.value)
+        return fold([e], self._visit)[0]
+
+    def _visit(self, node: Expression, args: list[Scalar]) -> Scalar:
+        if id(node) in self._index:
+            return Ratio(self._context.gens()[self._index[id(node)]], self._context.constant(1))
+        match node.op:
+            case "number":
+                return self.number(node.value)
+            case "add":
+                return args[0] + args[1]
+            case "sub":
+                return args[0] - args[1]
+            case "neg":
+                return -args[0]
+            case "mul":
+                return args[0] * args[1]
+            case "pow" if _integer_power(node):
+                return args[0] ** int(node.value)
+        if args:  # inside an atom: its value is not used
+            return args[0]
+        raise KeyError(str(node))
+
+    def expression(self, element: Scalar) -> Expression:
+        """The element as an expression."""
+        if self.is_rational:
+            return number(rational(element))
+        top, bottom = (self._polynomial(p) for p in (element.numerator, element.denominator))
+        return top if bottom.is_number and bottom.value == 1 else top / bottom
+
+    def _polynomial(self, polynomial: Any) -> Expression:
+        size = len(self._atoms)
+        terms = polynomial.to_dict().items()
+        return horner({tuple(int(e) for e in m)[:size]: number(rational(c)) for m, c in terms}, self._atoms)
+
+
+def _integer_power(node: Expression) -> bool:
+    return node.op == "pow" and node.value.denominator == 1
+
+

@@ -1,0 +1,109 @@
+"""From the forms of a spec to the Poisson tensor π_ij = {x_i, x_j}."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from phigen.errors import Diagnostic, SpecError
+from phigen.geometry.lie_algebra import LieAlgebra
+from phigen.geometry.shapes import Matrix, skew
+from phigen.spec.model import CanonicalForm, LieAlgebraForm, LogCanonicalForm, MatrixForm, NambuForm, PoissonForm
+from phigen.symbolic.expression import ONE, Expression, gradient, symbol, total
+
+
+def poisson_matrix(form: PoissonForm, coordinates: Sequence[str], algebra: LieAlgebra | None = None) -> Matrix:
+    """The n×n matrix of the form; ``algebra`` is that of `algebra_of_form`.
+
+    Raises `SpecError` where a size does not match the number of coordinates.
+    """
+    n = len(coordinates)
+    match form:
+        case MatrixForm(entries):
+            _expect_square(entries, n, "poisson matrix")
+            return entries
+        case CanonicalForm(q, p):
+            return _canonical(coordinates, q, p)
+        case LogCanonicalForm(a):
+            _expect_square(a, n, "log_canonical matrix")
+            x = [symbol(c) for c in coordinates]
+            return tuple(tuple(a[i][j] * (x[i] * x[j]) for j in range(n)) for i in range(n))
+        case NambuForm(casimirs):
+            return _nambu(coordinates, casimirs)
+        case LieAlgebraForm():
+            algebra = algebra or algebra_of_form(form, coordinates)
+            assert algebra is not None
+            return algebra.poisson(coordinates)
+
+
+def algebra_of_form(form: PoissonForm, coordinates: Sequence[str]) -> LieAlgebra | None:
+    """The Lie algebra of a ``lie_algebra`` form, its sign taken in; None for the other forms.
+
+    Raises `SpecError` for an unknown family, a dimension other than the number of coordinates, and what
+    `phigen.geometry.matrix_algebras` refuses.
+    """
+    if not isinstance(form, LieAlgebraForm):
+        return None
+    from phigen.geometry import families, matrix_algebras
+
+    if form.family:
+        algebra = families.named(form.family, form.size)
+    elif form.matrices:
+        algebra = matrix_algebras.from_matrices(form.matrices)
+    else:
+        algebra = matrix_algebras.from_structure_constants(len(coordinates), form.structure_constants)
+    if algebra.dimension != len(coordinates):
+        raise SpecError(
+            [
+                Diagnostic(
+                    f"{algebra.name} has dimension {algebra.dimension}, but there are {len(coordinates)} coordinates"
+                )
+            ]
+        )
+    return algebra.opposite() if form.sign < 0 else algebra
+
+
+def _canonical(coordinates: Sequence[str], q: Sequence[str], p: Sequence[str]) -> Matrix:
+    if len(q) != len(p):
+        raise SpecError([Diagnostic(f"canonical: {len(q)} positions but {len(p)} momenta")])
+    index = {c: i for i, c in enumerate(coordinates)}
+    upper: dict[tuple[int, int], Expression] = {}
+    for position, momentum in zip(q, p, strict=True):
+        i, j = index[position], index[momentum]
+        upper[min(i, j), max(i, j)] = ONE if i < j else -ONE
+    return skew(upper, len(coordinates))
+
+
+def _nambu(coordinates: Sequence[str], casimirs: Sequence[Expression]) -> Matrix:
+    """π_ij = det ∂(x_i, x_j, C_1, …, C_{n−2})/∂(x_1, …, x_n).
+
+    For n = 3 this is ẋ = ∇H×∇C up to the sign of the brackets: {x_1, x_2} = ∂C/∂x_3, so ẋ = ∇C... see `forms`.
+    """
+    n = len(coordinates)
+    if len(casimirs) != n - 2:
+        raise SpecError([Diagnostic(f"nambu: {n} coordinates need {n - 2} Casimirs, not {len(casimirs)}")])
+    rows = [gradient(c, coordinates) for c in casimirs]
+    upper = {}
+    for i in range(n):
+        for j in range(i + 1, n):
+            columns = [k for k in range(n) if k not in (i, j)]
+            minor = _determinant([[row[k] for k in columns] for row in rows])
+            upper[i, j] = minor if (i + j) % 2 else -minor
+    return skew(upper, n)
+
+
+def _determinant(rows: list[list[Expression]]) -> Expression:
+    """Laplace expansion along the first row; the matrices here are small and often sparse."""
+    if not rows:
+        return ONE
+    terms = []
+    for k, entry in enumerate(rows[0]):
+        if not entry.is_zero:
+            minor = _determinant([row[:k] + row[k + 1 :] for row in rows[1:]])
+            terms.append(entry * minor if k % 2 == 0 else -(entry * minor))
+    return total(terms)
+
+
+def _expect_square(rows: Sequence[Sequence[Expression]], n: int, what: str) -> None:
+    if len(rows) != n or any(len(row) != n for row in rows):
+        shape = "×".join([str(len(rows)), str(len(rows[0]) if rows else 0)])
+        raise SpecError([Diagnostic(f"the {what} is {shape}, but there are {n} coordinates")])

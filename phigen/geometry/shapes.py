@@ -1,0 +1,161 @@
+"""Structural recognition of a Poisson tensor: what kind of matrix π is, however it was typed.
+
+Coefficients may contain parameters, and functions of parameters.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from phigen.geometry.lie_algebra import LieAlgebra
+from phigen.symbolic.expression import ZERO, Expression, symbols_of
+from phigen.symbolic.tower import Poly, Tower
+
+Matrix = tuple[tuple[Expression, ...], ...]
+#: Exponents of the coordinates → coefficient, an expression in the parameters.
+Terms = dict[tuple[int, ...], Expression]
+
+
+@dataclass(frozen=True)
+class Constant:
+    """π does not depend on the coordinates."""
+
+    matrix: Matrix
+
+    def __str__(self) -> str:
+        return "constant"
+
+
+@dataclass(frozen=True)
+class Canonical:
+    """Constant, with {q_i, p_i} = 1 and all other brackets 0; the remaining coordinates are Casimirs."""
+
+    q: tuple[str, ...]
+    p: tuple[str, ...]
+    rest: tuple[str, ...]
+    matrix: Matrix
+
+    def __str__(self) -> str:
+        pairs = ", ".join(f"({q}, {p})" for q, p in zip(self.q, self.p, strict=True))
+        return f"canonical in {pairs}" + (f" with the Casimirs {', '.join(self.rest)}" if self.rest else "")
+
+
+@dataclass(frozen=True)
+class LogCanonical:
+    """{x_i, x_j} = a_ij x_i x_j with constant a_ij."""
+
+    a: Matrix
+
+    def __str__(self) -> str:
+        return "log-canonical"
+
+
+@dataclass(frozen=True)
+class LiePoisson:
+    """{x_i, x_j} = Σ_k c_ij^k x_k on the dual of a Lie algebra (Jacobi is not checked here)."""
+
+    algebra: LieAlgebra
+
+    def __str__(self) -> str:
+        return f"Lie–Poisson, {self.algebra.name}"
+
+
+@dataclass(frozen=True)
+class General:
+    """None of the other shapes."""
+
+    def __str__(self) -> str:
+        return "general"
+
+
+Shape = Constant | Canonical | LogCanonical | LiePoisson | General
+
+
+def recognise(coordinates: Sequence[str], poisson: Matrix) -> Shape:
+    """The shape of π; constant is preferred to log-canonical, and that to Lie–Poisson."""
+    upper = {(i, j): poisson[i][j] for j in range(len(coordinates)) for i in range(j)}
+    terms = coordinate_terms(coordinates, list(upper.values()))
+    if terms is None:
+        return General()
+    entries = dict(zip(upper, terms, strict=True))
+    return (
+        _constant(coordinates, entries, poisson)
+        or _log_canonical(len(coordinates), entries)
+        or _lie_poisson(coordinates, entries)
+        or General()
+    )
+
+
+def coordinate_terms(coordinates: Sequence[str], expressions: Sequence[Expression]) -> list[Terms] | None:
+    """The expressions as polynomials in the coordinates; None if one of them is not."""
+    names = list(coordinates) + [s for s in symbols_of(*expressions) if s not in coordinates]
+    tower = Tower(names, expressions)
+    found = []
+    for element in tower.convert_all(expressions):
+        terms = _split(tower, element, coordinates)
+        if terms is None:
+            return None
+        found.append(terms)
+    return found
+
+
+def _split(tower: Tower, element: Poly, coordinates: Sequence[str]) -> Terms | None:
+    size = len(coordinates)
+    used = element.degrees()
+    for position, g in enumerate(tower.generators, len(tower.symbols)):
+        if used[position] and tower.depends_on(tower.variable(g.name), coordinates):
+            return None
+    groups: dict[tuple[int, ...], dict[tuple[int, ...], object]] = {}
+    for monomial, c in element.to_dict().items():
+        exponents = tuple(int(e) for e in monomial[:size])
+        groups.setdefault(exponents, {})[(0,) * size + tuple(monomial[size:])] = c
+    parts = {e: tower.context.from_dict(part) for e, part in groups.items()}
+    return {e: tower.expression(part) for e, part in sorted(parts.items()) if not tower.is_zero(part)}
+
+
+def _constant(coordinates: Sequence[str], entries: dict[tuple[int, int], Terms], poisson: Matrix) -> Shape | None:
+    origin = (0,) * len(coordinates)
+    if any(set(terms) - {origin} for terms in entries.values()):
+        return None
+    values = {ij: terms[origin] for ij, terms in entries.items() if terms}
+    partners = [index for ij in sorted(values) for index in ij]
+    units = all(v.is_number and abs(v.value) == 1 for v in values.values())
+    matrix = skew(values, len(coordinates))
+    if not values or not units or len(set(partners)) < len(partners):
+        return Constant(matrix)
+    pairs = sorted(ij if values[ij].value == 1 else (ij[1], ij[0]) for ij in values)
+    rest = tuple(c for i, c in enumerate(coordinates) if i not in partners)
+    q = tuple(coordinates[i] for i, _ in pairs)
+    return Canonical(q, tuple(coordinates[j] for _, j in pairs), rest, matrix)
+
+
+def _log_canonical(n: int, entries: dict[tuple[int, int], Terms]) -> Shape | None:
+    a: dict[tuple[int, int], Expression] = {}
+    for (i, j), terms in entries.items():
+        wanted = tuple(1 if k in (i, j) else 0 for k in range(n))
+        if set(terms) - {wanted}:
+            return None
+        if terms:
+            a[i, j] = terms[wanted]
+    return LogCanonical(skew(a, n))
+
+
+def _lie_poisson(coordinates: Sequence[str], entries: dict[tuple[int, int], Terms]) -> Shape | None:
+    constants: dict[tuple[int, int], dict[int, Expression]] = {}
+    for ij, terms in sorted(entries.items()):
+        if any(sum(exponents) != 1 for exponents in terms):
+            return None
+        if terms:
+            constants[ij] = {exponents.index(1): c for exponents, c in sorted(terms.items(), reverse=True)}
+    n = len(coordinates)
+    name = f"a Lie algebra of dimension {n}"
+    return LiePoisson(LieAlgebra(name, n, constants, None, tuple(coordinates)))
+
+
+def skew(upper: dict[tuple[int, int], Expression], n: int) -> Matrix:
+    """The skew n×n matrix with the given entries above the diagonal."""
+    def entry(i: int, j: int) -> Expression:
+        return upper.get((i, j), ZERO) if i < j else -upper.get((j, i), ZERO)
+
+    return tuple(tuple(entry(i, j) for j in range(n)) for i in range(n))

@@ -1,0 +1,161 @@
+"""A Hamiltonian system on a Poisson manifold with global coordinates: the second stage of the compiler."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from phigen.errors import Diagnostic, Location, SpecError
+from phigen.geometry.casimirs import found_casimirs
+from phigen.geometry.forms import algebra_of_form, poisson_matrix
+from phigen.geometry.lie_algebra import LieAlgebra
+from phigen.geometry.shapes import LiePoisson, Matrix, Shape, recognise
+from phigen.spec.model import Parameter, PoissonForm, Spec
+from phigen.symbolic.expression import Expression, gradient, total
+
+
+@dataclass(frozen=True)
+class System:
+    """ẋ = π(x)∇H(x).
+
+    ``poisson`` is the n×n matrix π_ij = {x_i, x_j}; expressions use the coordinates and parameters as
+    symbols. ``casimirs`` holds the declared ones first, in the order of the spec, then the found ones
+    (``C1``, ``C2``, …; ``declared`` has the names of the former). ``shape`` is what π was recognised as,
+    ``form`` what the spec said. ``notes`` says what was not searched for, and why.
+    """
+
+    name: str
+    coordinates: tuple[str, ...]
+    parameters: tuple[Parameter, ...]
+    poisson: Matrix
+    hamiltonian: Expression
+    casimirs: Mapping[str, Expression]
+    invariants: Mapping[str, Expression]
+    shape: Shape
+    form: PoissonForm
+    declared: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+    locations: Mapping[tuple[Any, ...], Location] = field(default_factory=dict)
+
+    @property
+    def dimension(self) -> int:
+        """Number of coordinates."""
+        return len(self.coordinates)
+
+    @property
+    def parameter_names(self) -> tuple[str, ...]:
+        """Names of the parameters, in the order of the spec."""
+        return tuple(p.name for p in self.parameters)
+
+    @property
+    def positive(self) -> tuple[str, ...]:
+        """Names of the parameters that are positive."""
+        return tuple(p.name for p in self.parameters if p.positive)
+
+    @property
+    def lie_algebra(self) -> LieAlgebra | None:
+        """The Lie algebra of a Lie–Poisson π, else None."""
+        return self.shape.algebra if isinstance(self.shape, LiePoisson) else None
+
+    def vector_field(self) -> tuple[Expression, ...]:
+        """π∇H, one expression for each coordinate."""
+        return hamiltonian_vector_field(self.poisson, gradient(self.hamiltonian, self.coordinates))
+
+    @classmethod
+    def from_sympy(
+        cls,
+        coordinates: Sequence[Any],
+        poisson: Any,
+        hamiltonian: Any,
+        parameters: Mapping[Any, Any] | None = None,
+        *,
+        casimirs: Mapping[str, Any] | None = None,
+        invariants: Mapping[str, Any] | None = None,
+        name: str = "system",
+    ) -> System:
+        """A system from sympy objects.
+
+        ``coordinates`` are symbols (or names), ``poisson`` an n×n matrix or nested sequence, ``parameters``
+        maps symbols (or names) to default values; a symbol declared positive makes a positive parameter.
+        Raises `SpecError` for a matrix of the wrong size, unknown symbols and functions.
+        """
+        from phigen.geometry import sympy_bridge
+
+        return sympy_bridge.system(coordinates, poisson, hamiltonian, parameters, casimirs, invariants, name)
+
+
+def system_from_spec(spec: Spec) -> System:
+    """The system of a spec: π in matrix form, its shape, and the Casimirs that the form gives.
+
+    Nothing is proved here (`phigen.geometry.checks` does that), except what a Lie algebra needs to exist.
+    Raises `SpecError` for matrices that do not span a Lie algebra, structure constants without Jacobi
+    identity, and sizes that do not match the number of coordinates.
+    """
+    return build_system(
+        spec.name,
+        spec.coordinates,
+        spec.parameters,
+        spec.poisson,
+        spec.hamiltonian,
+        casimirs=spec.casimirs,
+        invariants=spec.invariants,
+        locations=spec.locations,
+    )
+
+
+def build_system(
+    name: str,
+    coordinates: Sequence[str],
+    parameters: Sequence[Parameter],
+    form: PoissonForm,
+    hamiltonian: Expression,
+    *,
+    casimirs: Mapping[str, Expression] | None = None,
+    invariants: Mapping[str, Expression] | None = None,
+    locations: Mapping[tuple[Any, ...], Location] | None = None,
+) -> System:
+    """A `System` from its parts; see `system_from_spec`."""
+    locations = locations or {}
+    declared = dict(casimirs or {})
+    try:
+        algebra = algebra_of_form(form, coordinates)
+        matrix = poisson_matrix(form, coordinates, algebra)
+    except SpecError as error:
+        raise _located(error, locations) from None
+    shape: Shape = LiePoisson(algebra) if algebra is not None else recognise(coordinates, matrix)
+    taken = {*coordinates, *(p.name for p in parameters), *declared, *(invariants or {})}
+    found, notes = found_casimirs(coordinates, matrix, shape, form, declared, taken)
+    return System(
+        name,
+        tuple(coordinates),
+        tuple(parameters),
+        matrix,
+        hamiltonian,
+        declared | found,
+        dict(invariants or {}),
+        shape,
+        form,
+        tuple(declared),
+        notes,
+        locations,
+    )
+
+
+def hamiltonian_vector_field(poisson: Matrix, differential: Sequence[Expression]) -> tuple[Expression, ...]:
+    """The product of an n×n matrix and a covector, zero entries skipped."""
+    return tuple(
+        total(entry * d for entry, d in zip(row, differential, strict=True) if not (entry.is_zero or d.is_zero))
+        for row in poisson
+    )
+
+
+def _located(error: SpecError, locations: Mapping[tuple[Any, ...], Location]) -> SpecError:
+    """The error with the place of the spec's ``poisson`` part where it has none."""
+    place = locations.get(("poisson",))
+    return SpecError(
+        [
+            Diagnostic(d.message, d.location or place, d.hint, d.source_line, d.severity)
+            for d in error.diagnostics
+        ]
+    )

@@ -1,0 +1,1 @@
+"""Bi-realisations: one file per kind, all behind the protocol of `phigen.realisations.catalogue`."""

@@ -1,0 +1,44 @@
+"""Canonical π, one-sided: α = (q, p + a), β = (q + b, p), or the adjoint. With k = 1 this is symplectic Euler.
+
+(a, b) is the covector at (q, p). For separable H the step is explicit.
+"""
+
+from __future__ import annotations
+
+from phigen.geometry.shapes import Canonical
+from phigen.geometry.system import System, hamiltonian_vector_field
+from phigen.realisations.protocol import BiRealisation, covector_symbols, is_symmetric, refuse
+from phigen.spec.model import BirealisationChoice
+from phigen.symbolic.expression import ZERO, symbol
+
+KIND = "canonical-euler"
+
+
+def build(system: System, choice: BirealisationChoice) -> BiRealisation:
+    """The bi-realisation of a canonical π; ``choice.side`` q or p names the part that α leaves alone.
+
+    q: α = (q, p + a), β = (q + b, p); p: α = (q − b, p), β = (q, p − a). Not symmetric, so that order k takes
+    S_1 … S_k. Coordinates that are Casimirs stay. Raises `SpecError` unless π is canonical in pairs.
+    """
+    shape = system.shape
+    if not isinstance(shape, Canonical):
+        raise refuse(f"birealisation {KIND} needs pairs with {{q, p}} = 1; this π is {shape}", "try auto")
+    if choice.side not in ("q", "p"):
+        raise refuse(f"side must be q or p, not {choice.side!r}")
+    increment = hamiltonian_vector_field(shape.matrix, covector_symbols(system.coordinates))
+    fixed = shape.q if choice.side == "q" else shape.p
+    displacement = [ZERO if c in fixed else -d for c, d in zip(system.coordinates, increment, strict=True)]
+    x = [symbol(c) for c in system.coordinates]
+    alpha = tuple(xi + d for xi, d in zip(x, displacement, strict=True))
+    beta = tuple(xi + (d if c in fixed else ZERO) for xi, d, c in zip(x, increment, system.coordinates, strict=True))
+    return BiRealisation(
+        KIND,
+        system.coordinates,
+        alpha,
+        beta,
+        tuple(displacement),
+        increment,
+        is_symmetric(alpha, beta, system.coordinates),
+        explanation=f"π is canonical: one-sided chart, α leaves {', '.join(fixed)} alone; explicit for separable H, "
+        "not symmetric, so order k takes S_1 … S_k",
+    )

@@ -1,0 +1,45 @@
+"""The kinds of bi-realisations, by name. To add a kind, add a file with KIND and build, and name it here."""
+
+from __future__ import annotations
+
+from phigen.errors import Diagnostic, SpecError
+from phigen.geometry.system import System
+from phigen.realisations import auto, canonical_euler, cayley, constant, custom, log_canonical
+from phigen.realisations.protocol import BiRealisation, Builder
+from phigen.spec.model import BirealisationChoice
+
+BUILDERS: dict[str, Builder] = {
+    module.KIND: module.build for module in (auto, constant, canonical_euler, log_canonical, cayley, custom)
+}
+
+#: Kinds of the spec format that a later version brings.
+PLANNED = ("exponential", "group-map", "karasev", "spray", "product", "pullback")
+
+
+def realise(system: System, choice: BirealisationChoice | None = None) -> BiRealisation:
+    """The bi-realisation that a spec asks for (default: ``auto``).
+
+    Nothing is assumed of it: pass it to `phigen.realisations.axioms.check`. Raises `SpecError`, located at the
+    spec's ``birealisation`` or ``poisson``, for kinds that do not apply to the system and unknown ones.
+    """
+    choice = choice or BirealisationChoice()
+    try:
+        return _builder(choice.kind)(system, choice)
+    except SpecError as error:
+        place = system.locations.get(("birealisation",)) or system.locations.get(("poisson",))
+        raise SpecError(
+            [Diagnostic(d.message, d.location or place, d.hint, d.source_line, d.severity) for d in error.diagnostics]
+        ) from None
+
+
+def _builder(kind: str) -> Builder:
+    found = BUILDERS.get(kind)
+    if found is not None:
+        return found
+    if kind in PLANNED:
+        raise SpecError([Diagnostic(f"birealisation {kind} is planned but not available yet", hint=_choices())])
+    raise SpecError([Diagnostic(f"unknown birealisation {kind!r}", hint=_choices())])
+
+
+def _choices() -> str:
+    return "available: " + ", ".join(BUILDERS)

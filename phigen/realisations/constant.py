@@ -1,0 +1,34 @@
+"""Constant π: α = x − ½πp, β = x + ½πp. With k = 1 this is the implicit midpoint rule."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+from phigen.geometry.shapes import Canonical, Constant
+from phigen.geometry.system import System, hamiltonian_vector_field
+from phigen.realisations.protocol import BiRealisation, covector_symbols, is_symmetric, refuse
+from phigen.spec.model import BirealisationChoice
+from phigen.symbolic.expression import number, symbol
+
+KIND = "constant"
+
+
+def build(system: System, choice: BirealisationChoice) -> BiRealisation:
+    """The bi-realisation of a constant π, symmetric and global; raises `SpecError` for any other π."""
+    if not isinstance(system.shape, Constant | Canonical):
+        raise refuse(f"birealisation {KIND} needs a constant π; this one is {system.shape}", "try auto")
+    increment = hamiltonian_vector_field(system.shape.matrix, covector_symbols(system.coordinates))
+    half = number(Fraction(1, 2))
+    x = [symbol(c) for c in system.coordinates]
+    alpha = tuple(a - half * d for a, d in zip(x, increment, strict=True))
+    beta = tuple(a + half * d for a, d in zip(x, increment, strict=True))
+    return BiRealisation(
+        KIND,
+        system.coordinates,
+        alpha,
+        beta,
+        tuple(-(half * d) for d in increment),
+        increment,
+        is_symmetric(alpha, beta, system.coordinates),
+        explanation="π is constant: α = x − ½πp, β = x + ½πp, the midpoint chart; symmetric and global",
+    )

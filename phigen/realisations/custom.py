@@ -1,0 +1,33 @@
+"""The user's own α and β; the axioms are checked as for every other kind."""
+
+from __future__ import annotations
+
+from phigen.geometry.system import System
+from phigen.realisations.protocol import BiRealisation, covector_names, is_symmetric, refuse, simplified_differences
+from phigen.spec.model import BirealisationChoice
+from phigen.symbolic.expression import symbol, symbols_of
+
+KIND = "custom"
+
+
+def build(system: System, choice: BirealisationChoice) -> BiRealisation:
+    """The bi-realisation with ``choice.alpha`` and ``choice.beta``; raises `SpecError` for wrong sizes or symbols."""
+    allowed = {*system.coordinates, *system.parameter_names, *covector_names(system.coordinates)}
+    for name, maps in (("alpha", choice.alpha), ("beta", choice.beta)):
+        if len(maps) != system.dimension:
+            raise refuse(f"birealisation {name} has {len(maps)} components for {system.dimension} coordinates")
+        unknown = [s for s in symbols_of(*maps) if s not in allowed]
+        if unknown:
+            raise refuse(f"birealisation {name} uses {unknown[0]}, which is no coordinate, parameter or p_NAME")
+    x = [symbol(c) for c in system.coordinates]
+    return BiRealisation(
+        KIND,
+        system.coordinates,
+        choice.alpha,
+        choice.beta,
+        simplified_differences(choice.alpha, x),
+        simplified_differences(choice.beta, choice.alpha),
+        is_symmetric(choice.alpha, choice.beta, system.coordinates),
+        explanation="α and β as given in the spec",
+        reference="given in the spec",
+    )

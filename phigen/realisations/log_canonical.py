@@ -1,0 +1,48 @@
+"""Log-canonical π, {x_i, x_j} = a_ij x_i x_j: α_j = x_j exp(½u_j), β_j = x_j exp(−½u_j), u_j = Σ_i a_ij x_i p_i.
+
+The paper prints α with the opposite sign in the exponent; its own Lotka–Volterra scheme has the sign used here.
+"""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+from phigen.geometry.shapes import LogCanonical
+from phigen.geometry.system import System
+from phigen.realisations.protocol import PAPER, BiRealisation, covector_symbols, is_symmetric, refuse
+from phigen.spec.model import BirealisationChoice
+from phigen.symbolic.expression import call, number, symbol, total
+
+KIND = "log-canonical"
+
+
+def build(system: System, choice: BirealisationChoice) -> BiRealisation:
+    """The bi-realisation of a log-canonical π, symmetric and global; raises `SpecError` for any other π.
+
+    The increment is −2 x_j sinh(½u_j).
+    """
+    if not isinstance(system.shape, LogCanonical):
+        raise refuse(f"birealisation {KIND} needs {{x_i, x_j}} = a_ij x_i x_j; this π is {system.shape}", "try auto")
+    a = system.shape.a
+    x = [symbol(c) for c in system.coordinates]
+    products = [xi * pi for xi, pi in zip(x, covector_symbols(system.coordinates), strict=True)]
+    half = number(Fraction(1, 2))
+    exponents = [
+        half * total(row[j] * w for row, w in zip(a, products, strict=True) if not row[j].is_zero)
+        for j in range(len(x))
+    ]
+    growth = [call("exp", u) for u in exponents]
+    alpha = tuple(xj * g for xj, g in zip(x, growth, strict=True))
+    beta = tuple(xj * call("exp", -u) for xj, u in zip(x, exponents, strict=True))
+    return BiRealisation(
+        KIND,
+        system.coordinates,
+        alpha,
+        beta,
+        tuple(xj * (g - 1) for xj, g in zip(x, growth, strict=True)),
+        tuple(-2 * (xj * call("sinh", u)) for xj, u in zip(x, exponents, strict=True)),
+        is_symmetric(alpha, beta, system.coordinates),
+        explanation="π is log-canonical: α_j = x_j exp(u_j/2), β_j = x_j exp(−u_j/2) with u_j = Σ a_ij x_i p_i; "
+        "symmetric and global, signs and zeros of the coordinates are kept",
+        reference=f"{PAPER}, the quadratic example, with the sign of its Lotka–Volterra scheme",
+    )

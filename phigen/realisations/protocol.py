@@ -1,0 +1,94 @@
+"""What every kind of bi-realisation delivers, and what a builder of one is."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from phigen.errors import Diagnostic, SpecError
+from phigen.geometry.system import System
+from phigen.spec.model import BirealisationChoice
+from phigen.symbolic.expression import Expression, substitute, symbol, symbols_of, topological
+from phigen.symbolic.tower import Tower
+
+PAPER = (
+    "O. Cosserat, C. Laurent-Gengoux, V. Salnikov, "
+    "Numerical Methods in Poisson Geometry and their Application to Mechanics"
+)
+
+
+@dataclass(frozen=True)
+class BiRealisation:
+    """Maps α, β : (x, p) → x with the axioms that `phigen.realisations.axioms` proves.
+
+    All tuples have one expression for each coordinate, in the symbols NAME (x), ``p:NAME`` (its covector) and
+    the parameters. With {x_i, p_j} = δ_ij: {α_i, α_j} = π_ij∘α, {β_i, β_j} = −π_ij∘β, {α_i, β_j} = 0.
+
+    - ``displacement``: α − x, simplified, so that nothing of size x cancels in it
+    - ``increment``: β − α, simplified in the same way
+    - ``symmetric``: whether β(x, p) = α(x, −p), proved
+    - ``exact``: False for a truncation, whose solver is Poisson only up to its order
+    - ``explanation``: what it is and why it was chosen, for the user; ``reference``: where it comes from
+    """
+
+    kind: str
+    coordinates: tuple[str, ...]
+    alpha: tuple[Expression, ...]
+    beta: tuple[Expression, ...]
+    displacement: tuple[Expression, ...]
+    increment: tuple[Expression, ...]
+    symmetric: bool
+    exact: bool = True
+    explanation: str = ""
+    reference: str = PAPER
+
+    @property
+    def covector(self) -> tuple[str, ...]:
+        """Names of the symbols p, in the order of the coordinates."""
+        return covector_names(self.coordinates)
+
+
+#: A kind of the catalogue: makes the bi-realisation of a system, or raises `SpecError` if it does not apply.
+Builder = Callable[[System, BirealisationChoice], BiRealisation]
+
+
+def covector_names(coordinates: Sequence[str]) -> tuple[str, ...]:
+    """Names ``p:NAME`` of the covector's symbols."""
+    return tuple(f"p:{c}" for c in coordinates)
+
+
+def covector_symbols(coordinates: Sequence[str]) -> list[Expression]:
+    """The covector's symbols."""
+    return [symbol(name) for name in covector_names(coordinates)]
+
+
+def reversed_covector(expressions: Sequence[Expression], coordinates: Sequence[str]) -> list[Expression]:
+    """The expressions with p replaced by −p."""
+    return substitute(expressions, {name: -symbol(name) for name in covector_names(coordinates)})
+
+
+def is_symmetric(alpha: Sequence[Expression], beta: Sequence[Expression], coordinates: Sequence[str]) -> bool:
+    """Whether β(x, p) = α(x, −p) is proved; the paper's integrators are then of even order."""
+    mirrored = reversed_covector(alpha, coordinates)
+    pairs = [(a, b) for a, b in zip(mirrored, beta, strict=True) if a is not b]
+    roots = [e for pair in pairs for e in pair]
+    tower = Tower(symbols_of(*roots), roots)
+    images = tower.convert_all(roots)
+    return all(tower.is_zero(a - b) for a, b in zip(images[::2], images[1::2], strict=True))
+
+
+def simplified_differences(left: Sequence[Expression], right: Sequence[Expression]) -> tuple[Expression, ...]:
+    """left − right, through the ring where that leaves fewer operations."""
+    roots = [a - b for a, b in zip(left, right, strict=True)]
+    tower = Tower(symbols_of(*roots), roots)
+    images = [tower.expression(element) for element in tower.convert_all(roots)]
+    return tuple(min(image, raw, key=_operations) for image, raw in zip(images, roots, strict=True))
+
+
+def _operations(e: Expression) -> int:
+    return sum(1 for node in topological([e]) if node.args)
+
+
+def refuse(message: str, hint: str = "") -> SpecError:
+    """The error of a builder that does not apply; the caller adds the place in the spec."""
+    return SpecError([Diagnostic(message, hint=hint)])

@@ -1,0 +1,154 @@
+"""Statements that were proved, refuted, or only checked at points; and how to decide that something is zero."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+
+from phigen.symbolic.expression import Expression, symbols_of, text
+from phigen.symbolic.numeric import DomainError, evaluate_exactly, evaluate_with_scale, is_rational
+from phigen.symbolic.tower import Poly, Tower
+
+PROVED = "proved"
+REFUTED = "refuted"
+CHECKED = "checked numerically"
+UNDECIDED = "undecided"
+
+POINTS = 8
+DIGITS = 60
+#: A value below 10**-ZERO_DIGITS of its scale counts as zero; rounding stays 15 digits below that.
+ZERO_DIGITS = 40
+_ATTEMPTS = 64
+_LONGEST = 160
+
+
+@dataclass(frozen=True)
+class Statement:
+    """One checked statement.
+
+    ``verdict`` is ``proved`` (in exact arithmetic, for all values of the symbols), ``refuted`` (``residual`` is
+    what should be zero and is not), ``checked numerically`` (``detail`` says at how many points and to
+    which tolerance) or ``undecided`` (not provable, and no point of the domain was found).
+    """
+
+    name: str
+    verdict: str
+    detail: str = ""
+    residual: str = ""
+
+    @property
+    def holds(self) -> bool:
+        """Whether the statement was proved or at least stood every numerical check."""
+        return self.verdict in (PROVED, CHECKED)
+
+    def __str__(self) -> str:
+        parts = [f"{self.name}: {self.verdict}"]
+        if self.detail:
+            parts.append(f" ({self.detail})")
+        if self.residual:
+            parts.append(f"; residual {self.residual}")
+        return "".join(parts)
+
+
+def decide_zero(
+    name: str, residuals: Iterable[tuple[str, Expression]], positive: Collection[str] = (), detail: str = ""
+) -> Statement:
+    """Whether all residuals vanish identically in their symbols.
+
+    ``residuals`` are pairs (label, expression); a label such as ``(x1, x2, x3)`` names the failing part in a
+    refutation. ``positive`` names the symbols that take positive values only. ``detail`` is added to a proof.
+    """
+    listed = [(label, e) for label, e in residuals if not e.is_zero]
+    tower = Tower(symbols_of(*(e for _, e in listed)), [e for _, e in listed])
+    elements = tower.convert_all([e for _, e in listed])
+    return decide_elements(
+        name, tower, [(label, f) for (label, _), f in zip(listed, elements, strict=True)], positive, detail
+    )
+
+
+def decide_elements(
+    name: str, tower: Tower, residuals: Iterable[tuple[str, Poly]], positive: Collection[str] = (), detail: str = ""
+) -> Statement:
+    """`decide_zero` for elements of a tower."""
+    pending: list[tuple[str, Expression]] = []
+    for label, element in residuals:
+        if not tower.is_zero(element):
+            pending.append((label, tower.expression(element)))
+    if not pending:
+        return Statement(name, PROVED, detail)
+    fewest = POINTS
+    for label, expression in pending:
+        found = _refuting_point(expression, positive)
+        if isinstance(found, str):
+            where = f"{label}, " if label else ""
+            more = f"; {len(pending)} parts do not reduce to 0" if len(pending) > 1 else ""
+            return Statement(name, REFUTED, f"{where}at {found}{more}", shortened(expression))
+        fewest = min(fewest, found)
+    parts = ", ".join(label for label, _ in pending if label)
+    about = f" for {parts}" if parts and len(parts) <= _LONGEST else ""
+    if fewest == 0:
+        return Statement(name, UNDECIDED, f"no proof{about}, and no point of the domain among {_ATTEMPTS} tried")
+    return Statement(name, CHECKED, f"{fewest} points, relative tolerance 1e-{ZERO_DIGITS}{about}")
+
+
+def _refuting_point(expression: Expression, positive: Collection[str]) -> str | int:
+    """A point where the expression is not zero and its value, as text; else the number of points tried."""
+    names = symbols_of(expression)
+    tried = 0
+    for k in range(_ATTEMPTS):
+        point = sample_point(names, positive, k)
+        try:
+            value = _value(expression, point)
+        except DomainError:
+            continue
+        if value:
+            where = ", ".join(f"{n}={v}" for n, v in point.items())
+            return f"{where if len(where) <= _LONGEST else f'point {k}'}: {value}"
+        tried += 1
+        if tried == POINTS or not names:
+            break
+    return tried
+
+
+def _value(expression: Expression, point: dict[str, Fraction]) -> str:
+    """The value as text, empty where it is zero."""
+    if is_rational(expression):
+        (exact,) = evaluate_exactly([expression], point)
+        return f"{float(exact):.4g}" if exact else ""
+    ((value, scale),) = evaluate_with_scale([expression], point, DIGITS)
+    return f"{float(value):.4g}" if abs(value) > scale * 10**-ZERO_DIGITS else ""
+
+
+def sample_point(names: Sequence[str], positive: Collection[str], index: int) -> dict[str, Fraction]:
+    """The ``index``-th of a fixed sequence of rational points between 1/5 and 3 in magnitude.
+
+    Points of odd index have negative components too, except for the ``positive`` names; the same names
+    always get the same points.
+    """
+    state = 88172645463325252 + 7919 * (index + 1)
+    point = {}
+    for name in names:
+        draws = []
+        for _ in range(3):
+            state = (6364136223846793005 * state + 1442695040888963407) % 2**64
+            draws.append(state >> 33)
+        denominator = 5 + draws[0] % 13
+        value = Fraction(1 + denominator // 5 + draws[1] % (3 * denominator - denominator // 5), denominator)
+        if index % 2 and draws[2] % 2 and name not in positive:
+            value = -value
+        point[name] = value
+    return point
+
+
+def shortened(expression: Expression) -> str:
+    """The expression as text of bounded length, for messages."""
+    written = text(expression)
+    return written if len(written) <= _LONGEST else written[: _LONGEST - 1] + "…"
+
+
+def all_hold(statements: Iterable[Statement]) -> bool:
+    """Whether no statement was refuted or left undecided."""
+    return all(s.holds for s in statements)
+
+
