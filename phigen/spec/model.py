@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any
 
-from phigen.errors import Location
+from phigen.errors import Diagnostic, Location
 from phigen.symbolic.expression import Expression
 
 Matrix = tuple[tuple[Expression, ...], ...]
@@ -142,3 +142,11 @@ class Spec:
     def dimension(self) -> int:
         """Number of coordinates."""
         return len(self.coordinates)
+
+    def diagnostic(self, path: tuple[Any, ...], message: str, hint: str = "") -> Diagnostic:
+        """A diagnostic at the part with that path of keys, or at the nearest part around it."""
+        while path and path not in self.locations:
+            path = path[:-1]
+        location = self.locations.get(path)
+        line = self.source.split("\n")[location.line - 1] if location else ""
+        return Diagnostic(message, location, hint, line)

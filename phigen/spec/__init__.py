@@ -1,0 +1,58 @@
+"""Spec files: from YAML to `Spec` with source positions, and every error a user can make in one.
+
+`load` and `loads` read a spec, `schema` describes the format for editors, `starter` writes a first one.
+"""
+
+from __future__ import annotations
+
+from os import PathLike, fspath
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from phigen.spec.model import Spec
+
+__all__ = ["load", "loads", "schema", "starter"]
+
+# The work is imported inside the functions: other modules import phigen.spec.model, and that shall be cheap.
+
+
+def load(path: str | PathLike[str]) -> Spec:
+    """The spec in a file.
+
+    Raises `SpecError` with all errors found, in the order of the file, or `LimitError` if a limit is exceeded.
+    """
+    from pathlib import Path
+
+    from phigen.errors import Diagnostic, SpecError
+    from phigen.spec import limits
+    from phigen.spec.validate import validate
+
+    file = fspath(path)
+    try:
+        with Path(file).open("rb") as stream:
+            data = stream.read(limits.FILE_BYTES + 1)
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise SpecError([Diagnostic(f"cannot read {file!r}: {reason}")]) from error
+    return validate(data, file)
+
+
+def loads(text: str, file: str = "<string>") -> Spec:
+    """The spec in a text; ``file`` is its name in messages. Raises as `load` does."""
+    from phigen.spec.validate import validate
+
+    return validate(text.encode("utf-8", "surrogatepass"), file)
+
+
+def schema() -> dict[str, Any]:
+    """JSON Schema (draft 2020-12) of spec files, for editors."""
+    from phigen.spec.schema import schema as build
+
+    return build()
+
+
+def starter(name: str) -> str:
+    """A commented spec to start from. Raises `SpecError` if the name is not one for a spec."""
+    from phigen.spec.starter import starter as build
+
+    return build(name)

@@ -1,0 +1,175 @@
+"""The format of a spec file, as one table; the validator and the JSON Schema are both made from it."""
+
+from __future__ import annotations
+
+from phigen.spec import limits
+from phigen.spec.kinds import (
+    Boolean,
+    Choice,
+    Either,
+    Field,
+    Formula,
+    Integer,
+    Kind,
+    ListOf,
+    MapOf,
+    Name,
+    Record,
+    Text,
+    Unavailable,
+)
+from phigen.spec.names import (
+    BIREALISATIONS,
+    CLASSICAL_METHODS,
+    FAMILY_HELP,
+    IDENTIFIER,
+    PLANNED,
+    POISSON_FORMS,
+    SPEC_NAME,
+)
+from phigen.spec.yaml_source import Mapping, Scalar, Sequence
+
+FORMAT_VERSION = 1
+
+NAME = Name(IDENTIFIER, "a name", "names are ASCII letters, digits and _, and start with a letter or _")
+RUN_NAME = Name(r"[A-Za-z0-9_][A-Za-z0-9_-]*", "the name of a run", "use ASCII letters, digits, _ and -")
+FORMULA, CONSTANT, INLINE, PROSE = Formula(), Formula(constant=True), Text(), Text(lines=True)
+FORMULAS = MapOf(NAME, FORMULA)
+MATRIX = ListOf(ListOf(FORMULA, least=1), least=1)
+BASIS = Name(r"E[1-9][0-9]*", "the name of a basis element", "basis elements are E1, E2, …")
+
+PARAMETER = Record(
+    "a parameter",
+    (
+        Field("value", CONSTANT, "default value", required=True),
+        Field("positive", Boolean(), "the value is always greater than 0; simplifications may use it", default=False),
+        Field("description", PROSE, "what it means"),
+    ),
+)
+CANONICAL = Record(
+    "canonical",
+    (
+        Field("q", ListOf(NAME, least=1), "positions q_1, …, q_m among the coordinates", required=True),
+        Field("p", ListOf(NAME, least=1), "their momenta p_1, …, p_m; {q_i, p_i} = 1", required=True),
+    ),
+)
+LIE_ALGEBRA = Record(
+    "lie_algebra",
+    (
+        Field("name", Name(r"[a-zA-Z]+\([0-9]+\)", "the name of a Lie algebra", f"write {FAMILY_HELP}"), FAMILY_HELP),
+        Field("matrices", ListOf(MATRIX, least=1), "square matrices E_1, …, E_n that span the algebra"),
+        Field(
+            "structure_constants",
+            MapOf(BASIS, MapOf(BASIS, MapOf(BASIS, FORMULA))),
+            "{E1: {E2: {E3: c}}} for [E_1, E_2] = c E_3; missing pairs are 0",
+        ),
+        Field("sign", Choice(("plus", "minus")), "{x_i, x_j} = ± Σ c_ij^k x_k", default="plus"),
+    ),
+    one=("name", "matrices", "structure_constants"),
+    exactly=True,
+)
+_FORMS: dict[str, tuple[Kind, str]] = {
+    "matrix": (MATRIX, "π as an n×n matrix of brackets {x_i, x_j}"),
+    "brackets": (MapOf(NAME, FORMULAS), "{x1: {x2: f}} for {x1, x2} = f; missing pairs are 0"),
+    "canonical": (CANONICAL, "{q_i, p_i} = 1"),
+    "log_canonical": (MATRIX, "the n×n matrix a of {x_i, x_j} = a_ij x_i x_j"),
+    "lie_algebra": (LIE_ALGEBRA, "the Lie–Poisson structure {x_i, x_j} = ± Σ c_ij^k x_k"),
+    "nambu": (ListOf(FORMULA), "n-2 Casimirs C_k of {f, g} = det ∂(f, g, C_1, …)/∂(x_1, …, x_n)"),
+}
+POISSON = Record(
+    "poisson",
+    tuple(Field(form, *_FORMS[form]) for form in POISSON_FORMS),
+    one=POISSON_FORMS,
+    exactly=True,
+    planned=PLANNED["poisson"],
+)
+KIND = Choice(BIREALISATIONS, PLANNED["birealisation"])
+BIREALISATION = Record(
+    "birealisation",
+    (
+        Field("kind", KIND, "auto picks by the shape of π", required=True),
+        Field("side", Choice(("q", "p")), "which half canonical-euler takes implicitly", default="q"),
+        Field("alpha", ListOf(FORMULA, least=1), "custom: α(x, p), one expression per coordinate, momenta are p_NAME"),
+        Field("beta", ListOf(FORMULA, least=1), "custom: β(x, p), one expression per coordinate, momenta are p_NAME"),
+    ),
+)
+SOLVER = Record(
+    "solver",
+    (
+        Field("method", Choice(("auto", "newton")), "how the implicit step is solved", default="auto"),
+        Field("tolerance", Formula(), "auto, or the tolerance of the solve", default="auto"),
+        Field("max_iterations", Integer(1, 1000), "iterations before a step fails", default=20),
+    ),
+)
+RUN = Record(
+    "a run",
+    (
+        Field(
+            "initial",
+            Either({Sequence: ListOf(CONSTANT, least=1), Mapping: MapOf(NAME, CONSTANT)}),
+            "initial values, as a list or by the name of the coordinate",
+            required=True,
+        ),
+        Field("step", CONSTANT, "step size h", required=True),
+        Field("steps", Integer(1, limits.STEPS, limit=True), "number of steps"),
+        Field("duration", CONSTANT, "time span instead of the number of steps; a multiple of the step"),
+        Field("stride", Integer(1, limits.STEPS, limit=True), "every how many steps are stored", default=1),
+        Field("parameters", MapOf(NAME, CONSTANT), "values that differ from the defaults"),
+        Field("exact", FORMULAS, "closed form by coordinate, in t and x0_NAME for initial values"),
+        Field("compare", ListOf(Choice(CLASSICAL_METHODS)), "classical methods to run beside it"),
+        Field("section", FORMULA, "Poincaré section: where this expression rises through 0"),
+        Field("description", PROSE, "what the run shows"),
+    ),
+    one=("steps", "duration"),
+    exactly=True,
+)
+
+
+def _switch(key: str, *words: str) -> Kind:
+    return Choice(words, PLANNED[key])
+
+
+SPEC = Record(
+    "a spec",
+    (
+        Field("phigen", Integer(FORMAT_VERSION, FORMAT_VERSION), "version of the format", required=True),
+        Field(
+            "name",
+            Name(SPEC_NAME, "a spec name", "lower-case letters, digits and _, starting with a letter, at most 31", 31),
+            "prefix of every generated symbol",
+            required=True,
+        ),
+        Field("title", INLINE, "what the system is, on one line"),
+        Field("description", PROSE, "what the system is, at length"),
+        Field("references", Either({Scalar: PROSE, Sequence: ListOf(PROSE)}), "where the system comes from"),
+        Field("license", INLINE, "SPDX identifier of the licence of the generated code", default="0BSD"),
+        Field("coordinates", ListOf(NAME, least=1, most=limits.COORDINATES), "names of x_1, …, x_n", required=True),
+        Field(
+            "parameters",
+            MapOf(NAME, Either({Scalar: CONSTANT, Mapping: PARAMETER})),
+            "run-time arguments of the generated code, with defaults",
+        ),
+        Field("definitions", FORMULAS, "named sub-expressions, usable in every expression"),
+        Field("poisson", POISSON, "the Poisson structure, in one of its forms", required=True),
+        Field("hamiltonian", FORMULA, "the Hamiltonian H; ẋ = π∇H", required=True),
+        Field("casimirs", FORMULAS, "Casimirs by name; checked"),
+        Field("invariants", FORMULAS, "further first integrals by name; checked"),
+        Field(
+            "birealisation", Either({Scalar: KIND, Mapping: BIREALISATION}), "the bi-realisation to use", default="auto"
+        ),
+        Field("order", Integer(1, limits.ORDER, limit=True), "order of the method", default=4),
+        Field("terms", Integer(1, limits.ORDER, limit=True), "instead of order: use exactly S_1, …, S_k"),
+        Field("composition", _switch("composition", "auto", "none"), "symmetric composition of steps", default="auto"),
+        Field(
+            "gauge",
+            Either({Scalar: _switch("gauge", "auto", "none"), Mapping: Unavailable()}),
+            "Casimirs subtracted from H before discretising",
+            default="auto",
+        ),
+        Field("scheme", _switch("scheme", "auto"), "how the one-step map is arranged", default="auto"),
+        Field("solver", SOLVER, "the inner solve of a step"),
+        Field("targets", ListOf(Choice(("c", "numpy")), least=1), "languages of the generated code"),
+        Field("runs", MapOf(RUN_NAME, RUN), "named experiments"),
+    ),
+    one=("order", "terms"),
+)

@@ -1,0 +1,434 @@
+"""The grammar of expressions: a precedence parser from text to `Expression`.
+
+::
+
+    sum      = product (("+" | "-") product)*
+    product  = sign (("*" | "/") sign)*
+    sign     = ("-" | "+") sign | power
+    power    = atom ["**" sign]
+    atom     = number | name | function "(" sum ("," sum)* ")" | "(" sum ")"
+
+Precedences are Python's: ``-x**2`` is −(x²) and ``2**3**2`` is 2⁹. Nothing is ever evaluated as Python;
+decimals are exact rationals; constants and exponents are bounded before anything is computed with them.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from fractions import Fraction
+from typing import Protocol
+
+from phigen.spec import limits
+from phigen.spec.names import SPEC_FUNCTIONS
+from phigen.spec.problems import did_you_mean, shown
+from phigen.spec.yaml_source import describe
+from phigen.symbolic.expression import (
+    EULER,
+    ONE,
+    PI,
+    Expression,
+    add,
+    call,
+    mul,
+    neg,
+    number,
+    power,
+    sqrt,
+    sub,
+    symbol,
+)
+
+CONSTANTS = {"pi": PI, "E": EULER}
+
+
+class Report(Protocol):
+    """Receives an error at a character of the expression's text."""
+
+    def __call__(self, message: str, index: int, hint: str = "", *, limit: bool = False) -> None: ...
+
+
+@dataclass(frozen=True)
+class Scope:
+    """The names an expression may use.
+
+    ``refused`` holds names that exist but not here, each with the message that says why and a hint.
+    With ``open``, any other name is taken for declared.
+    """
+
+    names: Mapping[str, Expression]
+    refused: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+    open: bool = False
+
+    def lookup(self, name: str) -> Expression | None:
+        """What a name stands for; declared names win over constants."""
+        if name in self.names:
+            return self.names[name]
+        if name in self.refused:
+            return None
+        return CONSTANTS.get(name) or (symbol(name) if self.open and name not in SPEC_FUNCTIONS else None)
+
+    def unknown(self, name: str) -> tuple[str, str]:
+        """Message and hint for a name that `lookup` does not find."""
+        if name in self.refused:
+            return self.refused[name]
+        if name.lower() in ("nan", "inf", "infinity"):
+            return f"{shown(name)} is not a finite number", ""
+        candidates = [*self.names, *SPEC_FUNCTIONS, *CONSTANTS]
+        return f"the name {shown(name)} is not declared", did_you_mean(name, candidates)
+
+
+_TOKEN = re.compile(
+    r"[ \t\n]*(?:(?P<number>(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)"
+    r"|(?P<name>[A-Za-z_][A-Za-z0-9_]*)"
+    r"|(?P<operator>\*\*|[-+*/(),])"
+    r"|(?P<end>\Z)"
+    r"|(?P<other>(?s:.)))"
+)
+_CHARACTER_HINTS = {
+    "^": "powers are written **",
+    "−": "the minus sign is -",
+    "–": "the minus sign is -",
+    "·": "products are written *",
+    "×": "products are written *",
+    "²": "powers are written **2",
+    "³": "powers are written **3",
+    "√": "square roots are written sqrt(…)",
+    "π": "the constant is written pi",
+    "[": "an expression is a scalar: use ( )",
+    "{": "an expression is a scalar: use ( )",
+    "=": "an expression has no = sign",
+    ".": "names have no parts: there is no attribute access",
+    "'": "expressions are not Python",
+    '"': "expressions are not Python",
+    ":": "expressions are not Python",
+}
+
+
+@dataclass(frozen=True)
+class Token:
+    """A lexical element: ``kind`` is number, name, operator or end."""
+
+    kind: str
+    text: str
+    index: int
+
+
+class _AbandonedError(Exception):
+    """The rest of the expression cannot be read; the error is reported."""
+
+
+def tokens(source: str, report: Report) -> list[Token] | None:
+    """The tokens of an expression, the last of kind ``end``, or ``None`` after reporting an error."""
+    if len(source) > limits.EXPRESSION_LENGTH:
+        message = f"the expression has {len(source)} characters, more than the limit of {limits.EXPRESSION_LENGTH}"
+        report(message, 0, "name parts of it under definitions", limit=True)
+        return None
+    found: list[Token] = []
+    for match in _TOKEN.finditer(source):
+        kind = match.lastgroup
+        assert kind is not None
+        text, index = match.group(kind), match.start(kind)
+        if kind == "other":
+            shape = shown(text) if text.isascii() and text.isprintable() else describe(text)
+            report(f"the character {shape} does not belong in an expression", index, _CHARACTER_HINTS.get(text, ""))
+            return None
+        found.append(Token(kind, text, index))
+        if kind == "end":
+            break
+    return found
+
+
+def names_in(source: str) -> list[str]:
+    """The names an expression mentions, in order, without reporting errors."""
+    found = tokens(source, lambda message, index, hint="", *, limit=False: None)
+    return [t.text for t in found or [] if t.kind == "name"]
+
+
+def parse(source: str, scope: Scope, report: Report) -> Expression | None:
+    """The expression that a text stands for; ``None`` after errors, which went to ``report``.
+
+    A syntax error ends the reading; unknown names and undefined values are all reported.
+    """
+    failed = False
+
+    def note(message: str, index: int, hint: str = "", *, limit: bool = False) -> None:
+        nonlocal failed
+        failed = True
+        report(message, index, hint, limit=limit)
+
+    found = tokens(source, note)
+    if found is None:
+        return None
+    try:
+        result = _Parser(found, scope, note).whole()
+    except _AbandonedError:
+        return None
+    return None if failed else result
+
+
+class _Parser:
+    def __init__(self, found: list[Token], scope: Scope, report: Report) -> None:
+        self.tokens, self.scope, self.report = found, scope, report
+        self.position = self.depth = self.nodes = 0
+        self.unknown: set[str] = set()
+
+    # --- reading tokens
+
+    @property
+    def here(self) -> Token:
+        return self.tokens[self.position]
+
+    def accept(self, *operators: str) -> Token | None:
+        token = self.here
+        if token.kind != "operator" or token.text not in operators:
+            return None
+        self.position += 1
+        return token
+
+    def abandon(self, message: str, index: int, hint: str = "", *, limit: bool = False) -> _AbandonedError:
+        self.report(message, index, hint, limit=limit)
+        return _AbandonedError()
+
+    def count(self, token: Token) -> None:
+        self.nodes += 1
+        if self.nodes > limits.EXPRESSION_NODES:
+            message = f"the expression has more than {limits.EXPRESSION_NODES} numbers, names and operators"
+            raise self.abandon(message, token.index, "name parts of it under definitions", limit=True)
+
+    def nested(self, rule: Callable[[], Expression], token: Token) -> Expression:
+        self.depth += 1
+        if self.depth > limits.EXPRESSION_DEPTH:
+            message = f"the expression is nested deeper than {limits.EXPRESSION_DEPTH} levels"
+            raise self.abandon(message, token.index, "name parts of it under definitions", limit=True)
+        result = rule()
+        self.depth -= 1
+        return result
+
+    # --- the rules of the grammar
+
+    def whole(self) -> Expression:
+        if self.here.kind == "end":
+            raise self.abandon("the expression is empty", 0)
+        result = self.sum()
+        if self.here.kind != "end":
+            raise self.misplaced()
+        return result
+
+    def misplaced(self) -> _AbandonedError:
+        """The error for a token after a complete operand."""
+        token, before = self.here, self.tokens[self.position - 1]
+        if token.text in (")", ","):
+            hint = "there is no ( before it" if token.text == ")" else "decimals have a point"
+            return self.abandon(f"unexpected {token.text!r}", token.index, hint)
+        if before.kind == "number" and token.text.startswith("_"):
+            return self.abandon(f"unexpected {shown(token.text)} after a number", token.index, "digits are not grouped")
+        hint = f"products are written with *: {before.text[-20:]}*{token.text[:20]}"
+        return self.abandon(f"an operator is missing before {shown(token.text)}", token.index, hint)
+
+    def sum(self) -> Expression:
+        left = self.product()
+        while token := self.accept("+", "-"):
+            self.count(token)
+            right = self.product()
+            left = self.bounded((add if token.text == "+" else sub)(left, right), token)
+        return left
+
+    def product(self) -> Expression:
+        left = self.sign()
+        while token := self.accept("*", "/"):
+            self.count(token)
+            after = self.here.index
+            right = self.sign()
+            if token.text == "/":
+                if right.is_zero:
+                    self.report("division by zero", after)
+                    right = ONE
+                right = self.raised(right, Fraction(-1), token)
+            left = self.bounded(mul(left, right), token)
+        return left
+
+    def sign(self) -> Expression:
+        token = self.accept("-", "+")
+        if token is None:
+            return self.power()
+        self.count(token)
+        operand = self.nested(self.sign, token)
+        return neg(operand) if token.text == "-" else operand
+
+    def power(self) -> Expression:
+        start, base = self.here, self.atom()
+        token = self.accept("**")
+        if token is None:
+            return base
+        self.count(token)
+        exponent = self.nested(self.sign, token)
+        if exponent.is_number:
+            return self.raised(base, exponent.value, token)
+        if base is EULER:
+            return call("exp", exponent)
+        if base.is_number and base.value < 0:
+            message = f"the negative number {base.value} has no power with an exponent that varies"
+            self.report(message, start.index, "the exponent must be an integer")
+            return base
+        return call("power", base, exponent)
+
+    def atom(self) -> Expression:
+        token = self.here
+        self.position += 1
+        if token.kind == "end":
+            raise self.abandon("the expression ends too early", token.index)
+        if token.kind == "operator" and token.text == "(":
+            result = self.nested(self.sum, token)
+            self.close(token)
+            return result
+        self.count(token)
+        if token.kind == "number":
+            return self.number(token)
+        if token.kind == "name":
+            return self.call(token) if self.here.text == "(" else self.name(token)
+        before = self.tokens[self.position - 2].text if self.position > 1 else ""
+        hint = "powers are written **; there is no //" if token.text == "/" and before == "/" else ""
+        raise self.abandon(f"unexpected {token.text!r}", token.index, hint)
+
+    def close(self, opening: Token) -> None:
+        if self.accept(")"):
+            return
+        if self.here.kind == "end":
+            raise self.abandon("this ( is never closed", opening.index)
+        raise self.misplaced()
+
+    # --- atoms
+
+    def number(self, token: Token) -> Expression:
+        mantissa, _, exponent = token.text.lower().partition("e")
+        # Bounded before the conversion: 1e999999999 would fill the memory.
+        digits = len(mantissa) + abs(int(exponent or 0)) if len(exponent) < 6 else math.inf
+        value = Fraction(token.text) if digits <= 2 * len(str(limits.DENOMINATOR)) else None
+        if value is None or not limits.number_is_bounded(value):
+            message = f"the number {token.text[:40]} is out of range"
+            self.report(message, token.index, "constants are below 1e40, with at most 79 decimals", limit=True)
+            return ONE
+        return number(value)
+
+    def name(self, token: Token) -> Expression:
+        value = self.scope.lookup(token.text)
+        if value is not None:
+            return value
+        if token.text not in self.unknown:
+            self.unknown.add(token.text)
+            if token.text in SPEC_FUNCTIONS and token.text not in self.scope.refused:
+                self.report(f"the function {token.text} needs an argument", token.index, f"{token.text}(…)")
+            else:
+                self.report(*self.named(token))
+        return symbol(f"unknown:{token.text}")
+
+    def named(self, token: Token) -> tuple[str, int, str]:
+        message, hint = self.scope.unknown(token.text)
+        return message, token.index, hint
+
+    def call(self, token: Token) -> Expression:
+        opening = self.here
+        self.position += 1
+        arity = SPEC_FUNCTIONS.get(token.text)
+        if arity is None:
+            declared = self.scope.lookup(token.text) is not None
+            guess = did_you_mean(token.text, SPEC_FUNCTIONS) or "functions are " + ", ".join(SPEC_FUNCTIONS)
+            hint = f"products are written with *: {token.text}*(…)" if declared else guess
+            raise self.abandon(f"{shown(token.text)} is not a function", token.index, hint)
+        arguments = [] if self.here.text == ")" else [self.nested(self.sum, opening)]
+        while arguments and self.accept(","):
+            arguments.append(self.nested(self.sum, opening))
+        self.close(opening)
+        if len(arguments) != arity:
+            wanted = "1 argument" if arity == 1 else f"{arity} arguments"
+            self.report(f"{token.text} takes {wanted}, not {len(arguments)}", token.index)
+            return ONE
+        return self.applied(token, arguments)
+
+    # --- operations that can be undefined or too large
+
+    def applied(self, token: Token, arguments: list[Expression]) -> Expression:
+        function, first = token.text, arguments[0]
+        if all(a.is_number for a in arguments) and not _defined(function, *(a.value for a in arguments)):
+            written = ", ".join(str(a.value) for a in arguments)
+            self.report(f"{function}({written}) is not defined", token.index)
+            return ONE
+        return sqrt(first) if function == "sqrt" else call(function, *arguments)
+
+    def raised(self, base: Expression, exponent: Fraction, token: Token) -> Expression:
+        """base ** exponent, refused before it is computed if it is undefined or too large."""
+        if abs(exponent) > limits.EXPONENT:
+            message = f"the exponent {_brief(exponent)} is out of range"
+            self.report(
+                message, token.index, f"exponents are between -{limits.EXPONENT} and {limits.EXPONENT}", limit=True
+            )
+            return ONE
+        if base.is_zero and exponent < 0:
+            self.report(f"0**({exponent}) is a division by zero", token.index)
+            return ONE
+        if base.is_number and base.value < 0 and exponent.denominator != 1:
+            self.report(f"({base.value})**({exponent}) is not a real number", token.index)
+            return ONE
+        head = base.args[0] if base.op in ("mul", "neg") else base
+        if head.is_number and exponent.denominator == 1:
+            size = max(abs(head.value.numerator), head.value.denominator)
+            if size > 1 and math.log10(size) * float(abs(exponent)) > 81:
+                message = f"the constant {_brief(head.value)}**{exponent} is out of range"
+                self.report(message, token.index, "constants are below 1e40", limit=True)
+                return ONE
+        return self.bounded(power(base, exponent), token)
+
+    def bounded(self, result: Expression, token: Token) -> Expression:
+        """The result, unless folding made a constant or an exponent that is out of range."""
+        parts = [result, *result.args]
+        for part in [*parts, *(a for p in parts[1:] for a in p.args)]:
+            if part.is_number and not limits.number_is_bounded(part.value):
+                self.report(
+                    f"the constant {_brief(part.value)} is out of range",
+                    token.index,
+                    "constants are below 1e40",
+                    limit=True,
+                )
+                return ONE
+            if part.op == "pow" and abs(part.value) > limits.EXPONENT:
+                self.report(f"the exponent {_brief(part.value)} is out of range", token.index, limit=True)
+                return ONE
+        return result
+
+
+def _brief(value: Fraction) -> str:
+    written = str(value)
+    return written if len(written) <= 40 else f"{float(value):.3e}"
+
+
+def _defined(function: str, first: Fraction, second: Fraction = Fraction(1)) -> bool:
+    match function:
+        case "sqrt":
+            return first >= 0
+        case "log":
+            return first > 0
+        case "asin" | "acos":
+            return abs(first) <= 1
+        case "acosh":
+            return first >= 1
+        case "atanh":
+            return abs(first) < 1
+        case "atan2":
+            return first != 0 or second != 0
+    return True
+
+
+def constant(expression: Expression) -> Fraction | None:
+    """The value of an expression without symbols: exact if it is rational, else that of the nearest double.
+
+    ``None`` if it is not finite or not a real number.
+    """
+    if expression.is_number:
+        value: Fraction = expression.value
+        return value
+    from phigen.spec.constants import nearest_double
+
+    return nearest_double(expression)

@@ -1,0 +1,390 @@
+"""Kinds of values a spec is made of: each reads a node and describes itself as JSON Schema.
+
+`fields.py` builds the table of the format from these; the validator and the schema both come from that
+table. Reading checks the shape only: texts of expressions stay `Scalar` nodes, to be parsed when the names
+are known. A value with an error is reported and reads as ``None``, which is never a value otherwise.
+"""
+
+# `return reader.error(…)` reports and returns None, the value of what has an error.
+# mypy: disable-error-code="func-returns-value"
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from fractions import Fraction
+from typing import Any
+
+from phigen.errors import Location
+from phigen.spec import limits
+from phigen.spec.names import planned
+from phigen.spec.problems import Problems, did_you_mean, one_of, shown
+from phigen.spec.yaml_source import Mapping as MappingNode
+from phigen.spec.yaml_source import Node, Scalar, describe, is_unprintable, kind_of
+from phigen.spec.yaml_source import Sequence as SequenceNode
+
+Path = tuple[Any, ...]
+Schema = dict[str, Any]
+
+
+@dataclass
+class Reader:
+    """What reading produces beside the values: the errors, and the place of every part."""
+
+    problems: Problems
+    locations: dict[Path, Location] = field(default_factory=dict)
+
+    def error(self, node: Node, message: str, hint: str = "", *, limit: bool = False) -> None:
+        """Report an error at a node."""
+        self.problems.add(message, node.location, hint, limit=limit)
+
+
+class Kind:
+    """A kind of value; ``expected`` names it in messages."""
+
+    expected = "a value"
+
+    def read(self, node: Node, path: Path, reader: Reader) -> Any:
+        """The value of a node, or ``None`` after reporting what is wrong."""
+        raise NotImplementedError
+
+    def schema(self) -> Schema:
+        """JSON Schema of the values."""
+        raise NotImplementedError
+
+    def mismatch(self, node: Node, path: Path, reader: Reader, hint: str = "") -> None:
+        """Report a node of the wrong kind."""
+        what = f"{path[-1]}: " if path and isinstance(path[-1], str) else ""
+        reader.error(node, f"{what}expected {self.expected}, found {kind_of(node)}", hint)
+
+
+@dataclass(frozen=True)
+class Text(Kind):
+    """Human text of one or many lines."""
+
+    lines: bool = False
+    expected = "text"
+
+    def read(self, node: Node, path: Path, reader: Reader) -> str | None:
+        if not isinstance(node, Scalar) or node.is_null:
+            return self.mismatch(node, path, reader)
+        if node.is_numeric or node.boolean is not None:
+            return self.mismatch(node, path, reader, "put text that looks like a value between quotes")
+        longest = limits.TEXT_LENGTH if self.lines else limits.LINE_LENGTH
+        if len(node.text) > longest:
+            return reader.error(node, f"the text has {len(node.text)} characters, the limit is {longest}", limit=True)
+        text = node.text.strip("\n") if self.lines else node.text.strip()
+        bad = [c for c in text if is_unprintable(c) and c not in ("\n\t" if self.lines else "")]
+        if bad == ["\n"] * len(bad) and bad:
+            return reader.error(node, f"{path[-1]}: expected one line of text, found {len(bad) + 1} lines")
+        if bad:
+            return reader.error(node, f"the text contains the character {describe(bad[0])}")
+        return text
+
+    def schema(self) -> Schema:
+        return {"type": "string", "maxLength": limits.TEXT_LENGTH if self.lines else limits.LINE_LENGTH}
+
+
+@dataclass(frozen=True)
+class Name(Kind):
+    """A text of a certain shape."""
+
+    pattern: str
+    expected: str = "a name"
+    hint: str = ""
+    longest: int = limits.NAME_LENGTH
+
+    def read(self, node: Node, path: Path, reader: Reader) -> Scalar | None:
+        if not isinstance(node, Scalar) or node.is_null:
+            return self.mismatch(node, path, reader)
+        return node if self.accepts(node, reader) else None
+
+    def accepts(self, node: Scalar, reader: Reader) -> bool:
+        """Whether the text has the shape; an error is reported if not."""
+        if len(node.text) > self.longest:
+            message = f"the name {shown(node.text, 30)} has {len(node.text)} characters, the limit is {self.longest}"
+            reader.error(node, message, limit=True)
+        elif not re.fullmatch(self.pattern, node.text):
+            strange = [c for c in node.text if not c.isascii() or not c.isprintable()]
+            detail = f" ({describe(strange[0])})" if strange else ""
+            reader.error(node, f"{shown(node.text)} is not {self.expected}{detail}", self.hint)
+        else:
+            return True
+        return False
+
+    def schema(self) -> Schema:
+        return {"type": "string", "pattern": f"^{self.pattern}$", "maxLength": self.longest}
+
+
+@dataclass(frozen=True)
+class Choice(Kind):
+    """One of some words; ``planned`` ones are known and refused as not available yet."""
+
+    words: tuple[str, ...]
+    planned: tuple[str, ...] = ()
+
+    @property
+    def expected(self) -> str:  # type: ignore[override]
+        return one_of(self.words)
+
+    def read(self, node: Node, path: Path, reader: Reader) -> str | None:
+        if not isinstance(node, Scalar) or node.is_null:
+            return self.mismatch(node, path, reader)
+        if node.text in self.words:
+            return node.text
+        if node.text in self.planned:
+            return reader.error(node, planned(f"{path[-1]}: {node.text}"), self.expected)
+        what = f"{path[-1]}: " if isinstance(path[-1], str) else ""
+        hint = did_you_mean(node.text, self.words + self.planned) or self.expected
+        return reader.error(node, f"{what}{shown(node.text)} is not known", hint)
+
+    def schema(self) -> Schema:
+        return {"enum": list(self.words)}
+
+
+@dataclass(frozen=True)
+class Integer(Kind):
+    """An integer in a range, written as a number."""
+
+    least: int
+    most: int
+    limit: bool = False  # whether more than the most is the breach of a limit
+
+    expected = "an integer"
+
+    def read(self, node: Node, path: Path, reader: Reader) -> int | None:
+        if not isinstance(node, Scalar) or not re.fullmatch(r"[+-]?[0-9]+(\.[0-9]*)?([eE]\+?[0-9]{1,2})?", node.text):
+            return self.mismatch(node, path, reader)
+        if not node.plain:
+            return self.mismatch(node, path, reader, "numbers need no quotes")
+        value = Fraction(node.text) if len(node.text) < 100 else Fraction(10) ** 100
+        if value.denominator != 1:
+            return self.mismatch(node, path, reader)
+        if self.least <= value <= self.most:
+            return int(value)
+        message = f"{path[-1]}: {node.text[:60]} is not between {self.least} and {self.most}"
+        if self.least == self.most:
+            message = f"{path[-1]}: {node.text[:60]} is not known; this version of phigen reads {self.least}"
+        return reader.error(node, message, limit=self.limit and value > self.most)
+
+    def schema(self) -> Schema:
+        return {"type": "integer", "minimum": self.least, "maximum": self.most}
+
+
+@dataclass(frozen=True)
+class Boolean(Kind):
+    """true or false."""
+
+    expected = "true or false"
+
+    def read(self, node: Node, path: Path, reader: Reader) -> bool | None:
+        if not isinstance(node, Scalar) or node.boolean is None:
+            hint = "YAML 1.2 has true and false only" if isinstance(node, Scalar) and node.plain else ""
+            return self.mismatch(node, path, reader, hint)
+        return node.boolean
+
+    def schema(self) -> Schema:
+        return {"type": "boolean"}
+
+
+@dataclass(frozen=True)
+class Formula(Kind):
+    """The text of an expression; parsed later. ``constant`` ones use no names."""
+
+    constant: bool = False
+
+    @property
+    def expected(self) -> str:  # type: ignore[override]
+        return "a number" if self.constant else "an expression"
+
+    def read(self, node: Node, path: Path, reader: Reader) -> Scalar | None:
+        if not isinstance(node, Scalar) or node.is_null:
+            return self.mismatch(node, path, reader)
+        if node.boolean is not None and self.constant:
+            return self.mismatch(node, path, reader)
+        return node
+
+    def schema(self) -> Schema:
+        return {"type": ["number", "string"], "maxLength": limits.EXPRESSION_LENGTH}
+
+
+@dataclass(frozen=True)
+class ListOf(Kind):
+    """A list of values of one kind."""
+
+    item: Kind
+    least: int = 0
+    most: int = limits.ENTRIES
+    expected = "a list"
+
+    def read(self, node: Node, path: Path, reader: Reader) -> list[Any] | None:
+        if not isinstance(node, SequenceNode):
+            return self.mismatch(node, path, reader, "lists are written [a, b]" if isinstance(node, Scalar) else "")
+        if len(node.items) < self.least:
+            return reader.error(node, f"{path[-1]}: expected at least {self.least} entries, found {len(node.items)}")
+        if len(node.items) > self.most:
+            return reader.error(node, f"{path[-1]}: {len(node.items)} entries, the limit is {self.most}", limit=True)
+        values = []
+        for index, item in enumerate(node.items):
+            reader.locations[*path, index] = item.location
+            values.append(self.item.read(item, (*path, index), reader))
+        return values
+
+    def schema(self) -> Schema:
+        return {"type": "array", "items": self.item.schema(), "minItems": self.least, "maxItems": self.most}
+
+
+@dataclass(frozen=True)
+class MapOf(Kind):
+    """A mapping from names of the user's to values of one kind; reads as name → (key, value)."""
+
+    key: Name
+    value: Kind
+    least: int = 0
+    expected = "a mapping"
+
+    def read(self, node: Node, path: Path, reader: Reader) -> dict[str, tuple[Scalar, Any]] | None:
+        if not isinstance(node, MappingNode):
+            hint = "remove the key, or write {} for none" if isinstance(node, Scalar) and node.is_null else ""
+            return self.mismatch(node, path, reader, hint)
+        if len(node.entries) < self.least:
+            return reader.error(node, f"{path[-1]}: expected at least {self.least} entry, found none")
+        if len(node.entries) > limits.ENTRIES:
+            message = f"{path[-1]}: {len(node.entries)} entries, the limit is {limits.ENTRIES}"
+            return reader.error(node, message, limit=True)
+        values = {}
+        for name, (key, item) in node.entries.items():
+            if self.key.accepts(key, reader):
+                inner = (*path, name)
+                reader.locations[inner] = place(key, item)
+                values[name] = (key, self.value.read(item, inner, reader))
+        return values
+
+    def schema(self) -> Schema:
+        names = {k: v for k, v in self.key.schema().items() if k != "type"}
+        return {
+            "type": "object",
+            "propertyNames": names,
+            "additionalProperties": self.value.schema(),
+            "minProperties": self.least,
+            "maxProperties": limits.ENTRIES,
+        }
+
+
+@dataclass(frozen=True)
+class Field:
+    """A key of a record."""
+
+    key: str
+    kind: Kind
+    description: str
+    required: bool = False
+    default: Any = None  # for the schema; the validator's defaults are those of the model
+
+
+@dataclass(frozen=True)
+class Record(Kind):
+    """A mapping with fixed keys; reads as key → value, keys in error absent.
+
+    ``one`` lists keys of which at most (``exactly``: exactly) one may be given. ``planned`` keys are known
+    and refused as not available yet.
+    """
+
+    what: str
+    fields: tuple[Field, ...]
+    one: tuple[str, ...] = ()
+    exactly: bool = False
+    planned: tuple[str, ...] = ()
+
+    @property
+    def expected(self) -> str:  # type: ignore[override]
+        return f"a mapping ({self.what})"
+
+    def read(self, node: Node, path: Path, reader: Reader) -> dict[str, Any] | None:
+        if not isinstance(node, MappingNode):
+            return self.mismatch(node, path, reader)
+        known = {f.key: f for f in self.fields}
+        values = {}
+        for name, (key, item) in node.entries.items():
+            if name in self.planned:
+                reader.error(key, planned(f"{self.what}: {name}"), one_of(known))
+            elif name not in known:
+                hint = did_you_mean(name, known) or "keys: " + ", ".join(known)
+                reader.error(key, f"{self.what} has no key {shown(name)}", hint)
+            else:
+                inner = (*path, name)
+                reader.locations[inner] = place(key, item)
+                value = known[name].kind.read(item, inner, reader)
+                if value is not None:
+                    values[name] = value
+        self.check_presence(node, reader)
+        return values
+
+    def check_presence(self, node: MappingNode, reader: Reader) -> None:
+        """Report missing keys, and keys that exclude each other."""
+        for wanted in self.fields:
+            if wanted.required and wanted.key not in node.entries:
+                reader.error(
+                    node, f"{self.what}: the key {wanted.key!r} is missing", f"{wanted.key}: {wanted.description}"
+                )
+        given = [name for name in node.entries if name in self.one]
+        for name in given[1:]:
+            message = f"{self.what}: {given[0]} and {name} exclude each other"
+            reader.error(node.entries[name][0], message, "give one of them")
+        known_to_be_planned = any(name in self.planned for name in node.entries)
+        if self.exactly and not given and not known_to_be_planned:
+            reader.error(node, f"{self.what}: one of {', '.join(self.one)} is needed")
+
+    def schema(self) -> Schema:
+        properties = {}
+        for f in self.fields:
+            properties[f.key] = {**f.kind.schema(), "description": f.description}
+            if f.default is not None:
+                properties[f.key]["default"] = f.default
+        schema: Schema = {"type": "object", "properties": properties, "additionalProperties": False}
+        if required := [f.key for f in self.fields if f.required]:
+            schema["required"] = required
+        if self.exactly:
+            schema["oneOf"] = [{"required": [key]} for key in self.one]
+        elif self.one:
+            schema["not"] = {"required": list(self.one)}
+        return schema
+
+
+@dataclass(frozen=True)
+class Either(Kind):
+    """A value of the first kind whose node type fits: ``{node type: kind}``."""
+
+    kinds: Mapping[type[Node], Kind]
+
+    @property
+    def expected(self) -> str:  # type: ignore[override]
+        return " or ".join(k.expected for k in self.kinds.values())
+
+    def read(self, node: Node, path: Path, reader: Reader) -> Any:
+        kind = self.kinds.get(type(node))
+        if kind is None or (isinstance(node, Scalar) and node.is_null):
+            return self.mismatch(node, path, reader)
+        return kind.read(node, path, reader)
+
+    def schema(self) -> Schema:
+        return {"anyOf": [k.schema() for k in self.kinds.values()]}
+
+
+@dataclass(frozen=True)
+class Unavailable(Kind):
+    """A form of the design that is refused as not available yet; not in the schema."""
+
+    expected = "a mapping"
+
+    def read(self, node: Node, path: Path, reader: Reader) -> None:
+        reader.error(node, planned(f"{path[-1]} with options"))
+
+    def schema(self) -> Schema:
+        return {"not": {}}
+
+
+def place(key: Scalar, value: Node) -> Location:
+    """Where to point for a part: at a scalar itself, at the key of a collection."""
+    return value.location if isinstance(value, Scalar) and not value.is_null else key.location

@@ -1,0 +1,78 @@
+"""Tables of names: what may be called how, and the names phigen knows."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+
+from phigen.symbolic.expression import FUNCTIONS
+
+#: Functions of expressions with their number of arguments; ``sign`` and ``power`` are phigen's own.
+SPEC_FUNCTIONS: dict[str, int] = {"sqrt": 1} | {f: n for f, n in FUNCTIONS.items() if f not in ("sign", "power")}
+
+SPEC_NAME = r"[a-z][a-z0-9_]{0,30}"
+IDENTIFIER = r"[A-Za-z_][A-Za-z0-9_]*"
+
+_C = """auto break case char const continue default do double else enum extern float for goto if inline int long
+register restrict return short signed sizeof static struct switch typedef union unsigned void volatile while
+bool true false nullptr constexpr thread_local alignas alignof static_assert typeof typeof_unqual"""
+_CPP = """and and_eq asm bitand bitor catch char8_t char16_t char32_t class compl concept consteval constinit
+const_cast co_await co_return co_yield decltype delete dynamic_cast explicit export friend mutable namespace new
+noexcept not not_eq operator or or_eq private protected public reinterpret_cast requires static_cast template this
+throw try typeid typename using virtual wchar_t xor xor_eq"""
+_PYTHON = """and as assert async await break class continue def del elif else except finally for from global if
+import in is lambda nonlocal not or pass raise return try while with yield match type"""
+KEYWORDS = frozenset(f"{_C} {_CPP} {_PYTHON}".split())
+
+#: NAME.h and NAME.py would hide these headers and modules, or cannot exist on Windows.
+_TAKEN = """assert complex ctype errno fenv float inttypes iso646 limits locale math setjmp signal stdalign stdarg
+stdatomic stdbool stddef stdint stdio stdlib stdnoreturn string tgmath threads time uchar wchar wctype
+numpy random operator types typing functools numbers warnings con prn aux nul"""
+TAKEN = frozenset(_TAKEN.split())
+
+#: Parameters are passed by keyword beside these arguments of the generated functions.
+ARGUMENTS = frozenset(["x", "x0", "X0", "h", "steps", "stride"])
+
+_LICENSES = """0BSD AFL-3.0 AGPL-3.0-only AGPL-3.0-or-later Apache-2.0 Artistic-2.0 BSD-1-Clause BSD-2-Clause
+BSD-2-Clause-Patent BSD-3-Clause BSD-3-Clause-Clear BSD-4-Clause BSL-1.0 CC-BY-4.0 CC-BY-SA-4.0 CC0-1.0 CECILL-2.1
+CECILL-B CECILL-C ECL-2.0 EPL-1.0 EPL-2.0 EUPL-1.1 EUPL-1.2 GPL-2.0-only GPL-2.0-or-later GPL-3.0-only
+GPL-3.0-or-later ISC LGPL-2.1-only LGPL-2.1-or-later LGPL-3.0-only LGPL-3.0-or-later LPPL-1.3c MIT MIT-0 MPL-2.0
+MS-PL MS-RL MulanPSL-2.0 NCSA OFL-1.1 OSL-3.0 PostgreSQL Python-2.0 Unlicense UPL-1.0 Vim WTFPL X11 Zlib
+zlib-acknowledgement ZPL-2.1"""
+LICENSES = tuple(_LICENSES.split())
+LICENSE_REFERENCE = re.compile(r"LicenseRef-[A-Za-z0-9.-]{1,60}")
+
+#: Lie algebras by family: the smallest n and the dimension; the argument of sp is 2n.
+FAMILIES: dict[str, tuple[int, Callable[[int], int]]] = {
+    "so": (2, lambda n: n * (n - 1) // 2),
+    "se": (2, lambda n: n * (n + 1) // 2),
+    "sl": (2, lambda n: n * n - 1),
+    "gl": (1, lambda n: n * n),
+    "su": (2, lambda n: n * n - 1),
+    "sp": (2, lambda n: n * (n + 1) // 2),
+    "heisenberg": (1, lambda n: 2 * n + 1),
+    "aff": (1, lambda n: 2),
+}
+#: Families of which only these members are built.
+MEMBERS = {"se": (2, 3), "aff": (1,)}
+FAMILY_HELP = "so(n), se(2), se(3), sl(n), gl(n), su(n), sp(2n), heisenberg(n) or aff(1)"
+FAMILY_NAME = re.compile(r"([a-z]+)\(([1-9][0-9]{0,2})\)")
+
+#: Kinds of bi-realisation, and names from the design that later versions will offer. Building one of the
+#: planned ones means moving its name to the first table.
+BIREALISATIONS = ("auto", "constant", "canonical-euler", "log-canonical", "cayley", "custom")
+POISSON_FORMS = ("matrix", "brackets", "canonical", "log_canonical", "lie_algebra", "nambu")
+PLANNED: dict[str, tuple[str, ...]] = {
+    "birealisation": ("exponential", "group-map", "karasev", "spray", "product", "pullback"),
+    "poisson": ("product", "pullback"),
+    "composition": ("triple-jump", "suzuki", "yoshida", "kahan-li", "blanes-moan"),
+    "gauge": (),
+    "scheme": (),
+}
+#: Classical methods a run can be compared with.
+CLASSICAL_METHODS = ("euler", "rk2", "rk4", "implicit-midpoint", "dop853")
+
+
+def planned(what: str) -> str:
+    """The message about a name of the design that is not built yet."""
+    return f"{what} is planned and not available in this version"

@@ -1,0 +1,204 @@
+"""The forms of a Poisson structure: from what was read to the data of `model.py`.
+
+Only what can be said without mathematics is checked here: shapes, names, and double statements.
+"""
+
+# `return reader.error(…)` reports and returns None, the value of what has an error.
+# mypy: disable-error-code="func-returns-value"
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from phigen.spec.declarations import Declarations
+from phigen.spec.grammar import Scope
+from phigen.spec.model import (
+    CanonicalForm,
+    LieAlgebraForm,
+    LogCanonicalForm,
+    MatrixForm,
+    NambuForm,
+    PoissonForm,
+)
+from phigen.spec.names import FAMILIES, FAMILY_HELP, FAMILY_NAME, MEMBERS
+from phigen.spec.problems import did_you_mean, shown
+from phigen.spec.yaml_source import Scalar
+from phigen.symbolic.expression import ZERO, Expression, neg
+
+Rows = list[list[Scalar | None] | None]
+Pairs = dict[tuple[int, int], tuple[Scalar, Expression]]
+
+
+def poisson_form(given: Mapping[str, Any], declared: Declarations) -> PoissonForm | None:
+    """The form of ``poisson:``, or ``None`` after errors."""
+    for form, value in given.items():
+        return _FORMS[form](value, declared)
+    return None
+
+
+def _fail(declared: Declarations, path: tuple[Any, ...], message: str, hint: str = "") -> None:
+    declared.reader.problems.add(message, declared.reader.locations["poisson", *path], hint)
+
+
+def _entries(
+    rows: Rows, path: tuple[Any, ...], declared: Declarations, scope: Scope, size: int
+) -> tuple[tuple[Expression, ...], ...] | None:
+    """A size×size matrix of expressions; errors name the row."""
+    what, before = ".".join(str(p) for p in path if isinstance(p, str)), len(declared.reader.problems.found)
+    if len(rows) != size:
+        hint = "one for each coordinate" if size == len(declared.coordinates) else "the matrix is square"
+        _fail(declared, path, f"{what}: expected {size} rows, found {len(rows)}", hint)
+    matrix = []
+    for i, row in enumerate(rows):
+        if row is not None and len(row) != size:
+            _fail(declared, (*path, i), f"{what}: row {i + 1} has {len(row)} entries, not {size}")
+        matrix.append(tuple(declared.formula(cell, scope) or ZERO for cell in row or ()))
+    return tuple(matrix) if len(declared.reader.problems.found) == before else None
+
+
+def _matrix(rows: Rows, declared: Declarations) -> PoissonForm | None:
+    entries = _entries(rows, ("matrix",), declared, declared.scope(), _dimension(declared, len(rows)))
+    return MatrixForm(entries) if entries is not None else None
+
+
+def _log_canonical(rows: Rows, declared: Declarations) -> PoissonForm | None:
+    scope = declared.constants("an entry of log_canonical")
+    a = _entries(rows, ("log_canonical",), declared, scope, _dimension(declared, len(rows)))
+    return LogCanonicalForm(a) if a is not None else None
+
+
+def _dimension(declared: Declarations, otherwise: int) -> int:
+    """The number of coordinates, if they could all be read."""
+    return otherwise if declared.incomplete else len(declared.coordinates)
+
+
+def _brackets(given: Mapping[str, Any], declared: Declarations) -> PoissonForm:
+    pairs: Pairs = {}
+    scope = declared.scope()
+    for key, row in given.values():
+        i = declared.coordinate(key)
+        for other, cell in (row or {}).values():
+            j = declared.coordinate(other)
+            value = declared.formula(cell, scope)
+            if i is not None and j is not None and value is not None:
+                _state(pairs, (i, j), (key, other), value, declared)
+    n = len(declared.coordinates)
+    matrix = [[ZERO] * n for _ in range(n)]
+    for (i, j), (_, value) in pairs.items():
+        matrix[i][j], matrix[j][i] = value, neg(value)
+    return MatrixForm(tuple(map(tuple, matrix)))
+
+
+def _state(
+    pairs: Pairs, pair: tuple[int, int], keys: tuple[Scalar, Scalar], value: Expression, declared: Declarations
+) -> None:
+    """Record {x_i, x_j} = value, unless it contradicts skew symmetry."""
+    (i, j), (a, b) = pair, keys
+    if i == j:
+        declared.reader.error(b, f"the bracket of {a.text!r} with itself is always 0", "remove it")
+    elif (j, i) in pairs and pairs[j, i][1] is not neg(value):
+        where = pairs[j, i][0].location
+        message = f"{{{a.text}, {b.text}}} is not written as the negative of {{{b.text}, {a.text}}}"
+        hint = f"the other is in line {where.line}, column {where.column}; give one of them"
+        declared.reader.error(b, message, hint)
+    else:
+        pairs[i, j] = b, value
+
+
+def _canonical(given: Mapping[str, Any], declared: Declarations) -> PoissonForm | None:
+    seen: dict[str, str] = {}
+    for key in ("q", "p"):
+        for node in given.get(key, ()):
+            if node is None or declared.coordinate(node) is None:
+                continue
+            if node.text in seen:
+                declared.reader.error(node, f"canonical: {node.text!r} is already in {seen[node.text]}")
+            seen.setdefault(node.text, key)
+    if "q" not in given or "p" not in given:
+        return None
+    q, p = given["q"], given["p"]
+    if len(q) != len(p):
+        return _fail(declared, ("canonical",), f"canonical: {len(q)} positions q, but {len(p)} momenta p")
+    if None in q or None in p:
+        return None
+    return CanonicalForm(tuple(node.text for node in q), tuple(node.text for node in p))
+
+
+def _lie_algebra(given: Mapping[str, Any], declared: Declarations) -> PoissonForm | None:
+    sign = -1 if given.get("sign") == "minus" else 1
+    if "name" in given:
+        return _family(given["name"], sign, declared)
+    if "matrices" in given:
+        return _spanned(given["matrices"], sign, declared)
+    if "structure_constants" in given:
+        return _structure_constants(given["structure_constants"], sign, declared)
+    return None
+
+
+def _family(node: Scalar, sign: int, declared: Declarations) -> PoissonForm | None:
+    match = FAMILY_NAME.fullmatch(node.text)
+    family, n = (match[1], int(match[2])) if match else ("", 0)
+    if family not in FAMILIES:
+        guess = did_you_mean(node.text.split("(")[0], FAMILIES) or f"names are {FAMILY_HELP}"
+        return declared.reader.error(node, f"the Lie algebra {shown(node.text)} is not known", guess)
+    least, dimension = FAMILIES[family]
+    if n < least or n not in MEMBERS.get(family, (n,)) or (family == "sp" and n % 2):
+        return declared.reader.error(node, f"the Lie algebra {node.text} is not available", f"names are {FAMILY_HELP}")
+    size = len(declared.coordinates)
+    if dimension(n) != size and not declared.incomplete:
+        count = "1 coordinate" if size == 1 else f"{size} coordinates"
+        return declared.reader.error(node, f"{node.text} has dimension {dimension(n)}, but there are {count}")
+    return LieAlgebraForm(sign=sign, family=family, size=n)
+
+
+def _spanned(given: list[Rows | None], sign: int, declared: Declarations) -> PoissonForm | None:
+    path, n = ("lie_algebra", "matrices"), _dimension(declared, len(given))
+    if len(given) != n:
+        _fail(declared, path, f"lie_algebra: {len(given)} matrices for {n} coordinates", "one for each coordinate")
+    scope = declared.constants("a matrix of a Lie algebra")
+    size = len(given[0] or ())
+    matrices = [_entries(m, (*path, i), declared, scope, size) if m is not None else None for i, m in enumerate(given)]
+    return LieAlgebraForm(sign=sign, matrices=tuple(m for m in matrices if m is not None))
+
+
+def _structure_constants(given: Mapping[str, Any], sign: int, declared: Declarations) -> PoissonForm:
+    scope, stated = declared.constants("a structure constant"), dict[int, Pairs]()
+    constants: dict[int, dict[int, dict[int, Expression]]] = {}
+    for first, row in given.values():
+        for second, sums in (row or {}).values():
+            for third, cell in (sums or {}).values():
+                i, j, k = (_basis_index(key, declared) for key in (first, second, third))
+                value = declared.formula(cell, scope)
+                if i is None or j is None or k is None or value is None:
+                    continue
+                _state(stated.setdefault(k, {}), (i, j), (first, second), value, declared)
+                constants.setdefault(i, {}).setdefault(j, {})[k] = value
+    return LieAlgebraForm(sign=sign, structure_constants=constants)
+
+
+def _basis_index(key: Scalar, declared: Declarations) -> int | None:
+    index, n = int(key.text[1:]) - 1, len(declared.coordinates)
+    if index < n or declared.incomplete:
+        return index
+    return declared.reader.error(
+        key, f"there is no basis element {key.text}", f"with {n} coordinates they are E1 to E{n}"
+    )
+
+
+def _nambu(given: list[Scalar | None], declared: Declarations) -> PoissonForm | None:
+    wanted = len(declared.coordinates) - 2
+    if len(given) != wanted and not declared.incomplete:
+        _fail(declared, ("nambu",), f"nambu: expected n-2 = {wanted} Casimirs, found {len(given)}")
+    casimirs = [declared.formula(node, declared.scope()) for node in given]
+    return NambuForm(tuple(c for c in casimirs if c is not None))
+
+
+_FORMS: dict[str, Callable[[Any, Declarations], PoissonForm | None]] = {
+    "matrix": _matrix,
+    "brackets": _brackets,
+    "canonical": _canonical,
+    "log_canonical": _log_canonical,
+    "lie_algebra": _lie_algebra,
+    "nambu": _nambu,
+}

@@ -1,0 +1,66 @@
+"""Collecting everything that is wrong with a spec, so that one run reports all of it."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+from phigen.errors import Diagnostic, LimitError, Location, SpecError
+from phigen.spec import limits
+
+
+def shown(value: object, length: int = 60) -> str:
+    """A value for a message: quoted, on one line, invisible characters escaped, shortened."""
+    text = str(value)
+    if len(text) > length:
+        text = text[: length - 1] + "…"
+    return repr(text)
+
+
+def did_you_mean(word: str, candidates: Iterable[str]) -> str:
+    """``did you mean 'x1'?``, or nothing when no candidate is close."""
+    if len(word) > limits.NAME_LENGTH:
+        return ""
+    choices = list(candidates)
+    close = [c for c in choices if c.lower() == word.lower()] or difflib.get_close_matches(word, choices, n=1)
+    return f"did you mean {close[0]!r}?" if close else ""
+
+
+def one_of(choices: Iterable[str]) -> str:
+    """``one of a, b, c``, for hints."""
+    return "one of " + ", ".join(choices)
+
+
+class Problems:
+    """The diagnostics of one file; `finish` raises them, in the order of the file."""
+
+    def __init__(self, file: str, source: str = "") -> None:
+        self.file = file
+        self.lines = source.split("\n")
+        self.found: dict[tuple[Location, str], Diagnostic] = {}
+        self.limit = False
+
+    def add(self, message: str, location: Location, hint: str = "", *, limit: bool = False) -> None:
+        """Record an error; the first mention of a message at a place counts. Raises when there are too many."""
+        line = self.lines[location.line - 1] if location.line <= len(self.lines) else ""
+        self.found.setdefault((location, message), Diagnostic(message, location, hint, line))
+        self.limit |= limit
+        if len(self.found) >= limits.ERRORS:
+            raise self.error()
+
+    def stop(self, message: str, location: Location, hint: str = "", *, limit: bool = False) -> SpecError:
+        """Record an error after which nothing can be read, and return the exception to raise."""
+        self.add(message, location, hint, limit=limit)
+        return self.error()
+
+    def error(self) -> SpecError:
+        """The exception that holds what was found; a `LimitError` if a limit is among it."""
+        ordered = [self.found[key] for key in sorted(self.found)]
+        if len(ordered) >= limits.ERRORS:
+            ordered.append(Diagnostic(f"there may be more: only {limits.ERRORS} errors are listed"))
+        return (LimitError if self.limit else SpecError)(ordered)
+
+    def finish(self) -> None:
+        """Raise what was found, if anything was."""
+        if self.found:
+            raise self.error()

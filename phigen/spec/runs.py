@@ -1,0 +1,138 @@
+"""The named experiments of a spec."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from fractions import Fraction
+from typing import Any
+
+from phigen.spec import limits
+from phigen.spec.declarations import Declarations
+from phigen.spec.grammar import Scope
+from phigen.spec.model import Run
+from phigen.spec.problems import did_you_mean, shown
+from phigen.spec.yaml_source import Scalar
+from phigen.symbolic.expression import Expression, symbol
+
+#: A duration counts as a multiple of the step up to this relative error: decimals of users are rounded.
+NEAR_INTEGER = Fraction(1, 10**9)
+
+
+def run(name: str, raw: Mapping[str, Any], declared: Declarations) -> Run:
+    """The run of that name. After errors, which are reported, some of its values are stand-ins."""
+    numbers = declared.numbers()
+    step = declared.number(raw.get("step"), numbers)
+    if step == 0:
+        _fail(name, "step", "the step is 0", declared)
+        step = None
+    steps = _steps(name, raw, step, declared)
+    stride = raw.get("stride", 1)
+    if steps is not None and stride > steps:
+        _fail(name, "stride", f"the stride {stride} is longer than the run of {steps} steps", declared)
+    section = raw.get("section")
+    return Run(
+        name=name,
+        initial=_initial(name, raw.get("initial"), declared),
+        step=step or Fraction(1),
+        steps=steps or 1,
+        stride=stride,
+        parameters=_overrides(raw.get("parameters", {}), declared),
+        exact=_exact(raw.get("exact", {}), declared),
+        compare=without_repetition(raw.get("compare", ()), ("runs", name, "compare"), declared),
+        section=declared.formula(section, declared.scope()),
+        description=raw.get("description", ""),
+    )
+
+
+def _fail(name: str, key: str, message: str, declared: Declarations, hint: str = "") -> None:
+    declared.reader.problems.add(message, declared.reader.locations["runs", name, key], hint)
+
+
+def _steps(name: str, raw: Mapping[str, Any], step: Fraction | None, declared: Declarations) -> int | None:
+    if "duration" not in raw:
+        return raw.get("steps")
+    duration = declared.number(raw["duration"], declared.numbers())
+    if duration is None or step is None:
+        return None
+    ratio, written = (
+        duration / step,
+        f"{raw['duration'].text} is {float(duration / step):.9g} steps of {raw['step'].text}",
+    )
+    steps = round(ratio)
+    if abs(ratio - steps) > NEAR_INTEGER * abs(ratio):
+        _fail(name, "duration", f"the duration {written}, not a whole number", declared, f"steps: {max(1, steps)}")
+    elif steps < 1:
+        hint = "a step backwards in time needs a negative duration" if step < 0 else "the duration must be positive"
+        _fail(name, "duration", f"the duration {written}", declared, hint)
+    elif steps > limits.STEPS:
+        location = declared.reader.locations["runs", name, "duration"]
+        message = f"the duration {written}, more than the limit of {limits.STEPS}"
+        declared.reader.problems.add(message, location, limit=True)
+    else:
+        return steps
+    return None
+
+
+def _initial(name: str, given: Any, declared: Declarations) -> tuple[Fraction, ...]:
+    n, scope = len(declared.coordinates), declared.numbers()
+    if isinstance(given, dict):
+        values = {k: (declared.coordinate(key), declared.number(node, scope)) for k, (key, node) in given.items()}
+        missing = [c for c in declared.coordinates if c not in values]
+        if missing:
+            _fail(name, "initial", f"initial: no value for {', '.join(missing[:10])}", declared)
+        return tuple(values[c][1] or Fraction(0) for c in declared.coordinates if c in values)
+    if given is None:
+        return ()
+    if len(given) != n and not declared.incomplete:
+        count = "1 coordinate" if n == 1 else f"{n} coordinates"
+        _fail(name, "initial", f"initial: {len(given)} values for {count}", declared)
+    return tuple(declared.number(node, scope) or Fraction(0) for node in given)
+
+
+def _overrides(given: Mapping[str, tuple[Scalar, Scalar | None]], declared: Declarations) -> dict[str, Fraction]:
+    values = {}
+    for name, (key, node) in given.items():
+        value = declared.number(node, declared.numbers())
+        parameter = declared.parameters.get(name)
+        if parameter is None:
+            hint = did_you_mean(name, declared.parameters)
+            declared.reader.error(key, f"{shown(name)} is not a parameter", hint)
+        elif value is not None and node is not None:
+            if parameter.positive and value <= 0:
+                message = f"the parameter {name!r} is positive by declaration, but its value is {node.text}"
+                declared.reader.error(node, message)
+            values[name] = value
+    return values
+
+
+def _exact(given: Mapping[str, tuple[Scalar, Scalar | None]], declared: Declarations) -> dict[str, Expression]:
+    if not given:
+        return {}
+    own = {"t": symbol("t:")} | {f"x0_{c}": symbol(f"x0:{c}") for c in declared.coordinates}
+    for name in (*declared.parameters, *declared.definitions):
+        if name in own:
+            message = f"the name {name!r} has a meaning of its own in the exact solution of a run"
+            declared.reader.error(declared.nodes[name], message, "choose another name")
+    scope = declared.constants("an exact solution", own)
+    hints = {c: (scope.refused[c][0], f"initial values are written x0_{c}") for c in declared.coordinates}
+    # A coordinate t is no obstacle: an exact solution is about the time.
+    refused = {n: why for n, why in {**scope.refused, **hints}.items() if n not in own}
+    scope = Scope(scope.names, refused, scope.open)
+    values = {}
+    for name, (key, node) in given.items():
+        expression = declared.formula(node, scope)
+        if declared.coordinate(key) is not None and expression is not None:
+            values[name] = expression
+    return values
+
+
+def without_repetition(words: Any, path: tuple[Any, ...], declared: Declarations) -> tuple[str, ...]:
+    """A list of words, each once; repetitions are reported."""
+    seen: list[str] = []
+    for index, word in enumerate(words):
+        if word in seen:
+            location = declared.reader.locations[*path, index]
+            declared.reader.problems.add(f"{path[-1]}: {word} is given twice", location)
+        elif word is not None:
+            seen.append(word)
+    return tuple(seen)

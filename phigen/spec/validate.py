@@ -1,0 +1,133 @@
+"""From the text of a spec file to `Spec`, or to all of its errors."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from fractions import Fraction
+from typing import Any
+
+from phigen.spec.declarations import Declarations, declare
+from phigen.spec.fields import SPEC
+from phigen.spec.kinds import Reader
+from phigen.spec.model import BirealisationChoice, MatrixForm, SolverOptions, Spec
+from phigen.spec.names import KEYWORDS, LICENSE_REFERENCE, LICENSES, TAKEN
+from phigen.spec.poisson import poisson_form
+from phigen.spec.problems import Problems, did_you_mean, shown
+from phigen.spec.runs import run, without_repetition
+from phigen.spec.yaml_source import Scalar, decode, read
+from phigen.symbolic.expression import ZERO, Expression, symbol
+
+DEFAULT_ORDER = 4
+
+
+def validate(data: bytes, file: str) -> Spec:
+    """The spec in the bytes of a file.
+
+    Raises `SpecError` with every error, in the order of the file; `LimitError` if a limit is among them.
+    """
+    source = decode(data, file)
+    problems = Problems(file, source)
+    reader = Reader(problems)
+    raw = SPEC.read(read(source, problems), (), reader) or {}
+    parts = _parts(raw, declare(raw, reader))
+    problems.finish()
+    digest = hashlib.sha256(source.encode()).hexdigest()
+    return Spec(**parts, source_sha256=digest, file=file, source=source, locations=reader.locations)
+
+
+def _parts(raw: Mapping[str, Any], declared: Declarations) -> dict[str, Any]:
+    """The arguments of `Spec`; after errors, which are reported, some of them are stand-ins."""
+    references = raw.get("references", ())
+    return {
+        "name": _name(raw.get("name"), declared),
+        "coordinates": declared.coordinates,
+        "poisson": poisson_form(raw.get("poisson", {}), declared) or MatrixForm(()),
+        "hamiltonian": declared.formula(raw.get("hamiltonian"), declared.scope()) or ZERO,
+        "parameters": tuple(declared.parameters.values()),
+        "casimirs": _formulas(raw.get("casimirs", {}), declared),
+        "invariants": _formulas(raw.get("invariants", {}), declared),
+        "birealisation": _birealisation(raw.get("birealisation", "auto"), declared),
+        "order": raw.get("order", None if "terms" in raw else DEFAULT_ORDER),
+        "terms": raw.get("terms"),
+        # Neither has anything to choose from yet, so that auto is none.
+        "composition": "none",
+        "gauge": "none",
+        "scheme": raw.get("scheme", "auto"),
+        "solver": _solver(raw.get("solver", {}), declared),
+        "targets": without_repetition(raw.get("targets", ("c", "numpy")), ("targets",), declared),
+        "runs": {n: run(n, r, declared) for n, (_, r) in raw.get("runs", {}).items() if r is not None},
+        "title": raw.get("title", ""),
+        "description": raw.get("description", ""),
+        "references": (references,) if isinstance(references, str) else tuple(r for r in references if r),
+        "license": _license(raw.get("license", "0BSD"), declared),
+    }
+
+
+def _name(node: Scalar | None, declared: Declarations) -> str:
+    if node is None:
+        return ""
+    if node.text in KEYWORDS:
+        declared.reader.error(
+            node, f"the spec name {node.text!r} is a keyword of C, C++ or Python", f"{node.text}_system"
+        )
+    elif node.text in TAKEN:
+        message = f"the spec name {node.text!r} would hide a standard header or module of that name"
+        declared.reader.error(node, message, f"{node.text}_system")
+    return node.text
+
+
+def _formulas(given: Mapping[str, tuple[Scalar, Scalar | None]], declared: Declarations) -> dict[str, Expression]:
+    scope = declared.scope()
+    values = {name: declared.formula(node, scope) for name, (_, node) in given.items()}
+    return {name: value for name, value in values.items() if value is not None}
+
+
+def _license(given: str, declared: Declarations) -> str:
+    for part in given.replace(" AND ", " OR ").split(" OR "):
+        if part not in LICENSES and not LICENSE_REFERENCE.fullmatch(part):
+            hint = did_you_mean(part, LICENSES) or "any other licence is written LicenseRef-NAME"
+            message = f"license: {shown(part)} is not an SPDX identifier that phigen knows"
+            declared.reader.problems.add(message, declared.reader.locations["license",], hint)
+    return given
+
+
+def _birealisation(given: str | Mapping[str, Any], declared: Declarations) -> BirealisationChoice:
+    options = {"kind": given} if isinstance(given, str) else given
+    kind = options.get("kind", "")
+    for key, owner in (("alpha", "custom"), ("beta", "custom"), ("side", "canonical-euler")):
+        location = declared.reader.locations.get(("birealisation", key))
+        if key in options and kind and kind != owner and location is not None:
+            declared.reader.problems.add(f"birealisation: {key} belongs to the kind {owner}, not {kind}", location)
+    if kind != "custom":
+        return BirealisationChoice(kind=kind, side=options.get("side", "q"))
+    for key in ("alpha", "beta"):
+        if key not in options:
+            place, hint = declared.reader.locations["birealisation",], "{kind: custom, alpha: […], beta: […]}"
+            declared.reader.problems.add(f"birealisation: the kind custom needs {key}", place, hint)
+    return _custom(options, declared)
+
+
+def _custom(options: Mapping[str, Any], declared: Declarations) -> BirealisationChoice:
+    momenta = {f"p_{c}": symbol(f"p:{c}") for c in declared.coordinates}
+    for name in momenta.keys() & declared.nodes.keys():
+        message = f"the name {name!r} means the momentum of {name[2:]!r} in a custom bi-realisation"
+        declared.reader.error(declared.nodes[name], message, "choose another name")
+    n, scope, halves = len(declared.coordinates), declared.scope(momenta), {}
+    for key in ("alpha", "beta"):
+        nodes = options.get(key, ())
+        if len(nodes) != n and key in options and not declared.incomplete:
+            message = f"birealisation: {key} has {len(nodes)} expressions for {n} coordinates"
+            declared.reader.problems.add(message, declared.reader.locations["birealisation", key])
+        halves[key] = tuple(declared.formula(node, scope) or ZERO for node in nodes)
+    return BirealisationChoice(kind="custom", alpha=halves["alpha"], beta=halves["beta"])
+
+
+def _solver(given: Mapping[str, Any], declared: Declarations) -> SolverOptions:
+    node = given.get("tolerance")
+    tolerance: Fraction | None = None
+    if node is not None and node.text != "auto":
+        tolerance = declared.number(node, declared.numbers())
+        if tolerance is not None and not 0 < tolerance < 1:
+            declared.reader.error(node, f"tolerance: {node.text} is not between 0 and 1")
+    return SolverOptions(given.get("method", "auto"), tolerance, given.get("max_iterations", 20))

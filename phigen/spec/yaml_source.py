@@ -1,0 +1,270 @@
+"""YAML 1.2 into a tree of nodes that know their places.
+
+Built on ruamel's event stream rather than its loaders: anchors, aliases and tags are refused as they come
+by, before anything can expand; nesting is counted before it can exhaust the stack; and a scalar keeps its
+text, so that ``1e-3`` is an exact rational and ``no`` is a name.
+"""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from dataclasses import dataclass, field
+from typing import Any
+
+from phigen.errors import Location
+from phigen.spec import limits
+from phigen.spec.problems import Problems, shown
+
+
+@dataclass
+class Node:
+    """A YAML value and where it starts."""
+
+    location: Location
+
+
+@dataclass
+class Scalar(Node):
+    """Text as YAML delivers it; ``offset`` says how far its first character is from the location, if fixed.
+
+    ``offset`` is ``None`` when characters of the text do not correspond one to one to columns of a line
+    (block scalars, several lines, escapes).
+    """
+
+    text: str
+    plain: bool
+    offset: int | None
+
+    def at(self, index: int) -> Location:
+        """The place of a character of the text, or of the scalar where that is unknown."""
+        if self.offset is None:
+            return self.location
+        here = self.location
+        return Location(here.line, here.column + self.offset + index, here.file)
+
+    @property
+    def is_null(self) -> bool:
+        """Whether YAML reads it as null."""
+        return self.plain and self.text in ("", "~", "null", "Null", "NULL")
+
+    @property
+    def boolean(self) -> bool | None:
+        """The boolean that YAML 1.2 reads, if it is one."""
+        return _BOOLEANS.get(self.text) if self.plain else None
+
+    @property
+    def is_numeric(self) -> bool:
+        """Whether YAML reads it as a number."""
+        return self.plain and _NUMBER.fullmatch(self.text) is not None
+
+
+@dataclass
+class Sequence(Node):
+    """A YAML sequence."""
+
+    items: list[Node] = field(default_factory=list)
+
+
+@dataclass
+class Mapping(Node):
+    """A YAML mapping, in the order of the file; duplicate keys are already reported and dropped."""
+
+    entries: dict[str, tuple[Scalar, Node]] = field(default_factory=dict)
+
+
+_BOOLEANS = {"true": True, "True": True, "TRUE": True, "false": False, "False": False, "FALSE": False}
+_NUMBER = re.compile(
+    r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?|0o[0-7]+|0x[0-9a-fA-F]+|[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)"
+)
+_BYTE_ORDER_MARKS = (
+    (b"\xef\xbb\xbf", "UTF-8"),
+    (b"\xff\xfe\x00\x00", "UTF-32"),
+    (b"\x00\x00\xfe\xff", "UTF-32"),
+    (b"\xff\xfe", "UTF-16"),
+    (b"\xfe\xff", "UTF-16"),
+)
+#: Joiners and the soft hyphen occur in honest text; other format characters can make a line read differently.
+_HARMLESS = "\u200c\u200d\u00ad"
+
+
+def kind_of(node: Node) -> str:
+    """What a node is, for "expected …, found …"."""
+    if isinstance(node, Sequence):
+        return "a list"
+    if isinstance(node, Mapping):
+        return "a mapping"
+    assert isinstance(node, Scalar)
+    if node.is_null:
+        return "nothing"
+    if node.boolean is not None:
+        return f"the boolean {node.text}"
+    return f"the number {node.text[:60]}" if node.is_numeric else f"the text {shown(node.text)}"
+
+
+def is_unprintable(character: str) -> bool:
+    """Whether a character is a control, bidirectional override, surrogate or the like."""
+    if character in _HARMLESS:
+        return False
+    return unicodedata.category(character) in ("Cc", "Cf", "Cs", "Zl", "Zp") or (ord(character) & 0xFFFE) == 0xFFFE
+
+
+def describe(character: str) -> str:
+    """``U+202E RIGHT-TO-LEFT OVERRIDE``."""
+    return f"U+{ord(character):04X} {unicodedata.name(character, 'control character')}"
+
+
+def decode(data: bytes, file: str) -> str:
+    """The text of a file, with ``\\n`` line ends.
+
+    Raises `SpecError` for what is not text in UTF-8 and `LimitError` for what is too long.
+    """
+    problems, start = Problems(file), Location(1, 1, file)
+    if len(data) > limits.FILE_BYTES:
+        message = f"the file is larger than {limits.FILE_BYTES // 1024} kB, the limit for a spec"
+        raise problems.stop(message, start, limit=True)
+    for mark, encoding in _BYTE_ORDER_MARKS:
+        if data.startswith(mark):
+            message = f"the file starts with a byte order mark of {encoding}"
+            raise problems.stop(message, start, "save it as UTF-8 without a byte order mark")
+    try:
+        text = data.decode("utf-8")
+    except UnicodeDecodeError as error:
+        before = data[: error.start].decode("utf-8").replace("\r\n", "\n")
+        byte = f"the byte 0x{data[error.start]:02x} is not valid UTF-8"
+        raise problems.stop(byte, _location(before, len(before), file), "save the file as UTF-8") from None
+    text = text.replace("\r\n", "\n")
+    problems = Problems(file, text)
+    if not text.isascii() or re.search(r"[\x00-\x08\x0b-\x1f\x7f]", text):
+        for index, character in enumerate(text):
+            if (
+                character not in "\n\t"
+                and (not character.isascii() or not character.isprintable())
+                and is_unprintable(character)
+            ):
+                message = f"the character {describe(character)} is not allowed in a spec"
+                problems.add(message, _location(text, index, file), "delete it, or write it as an escape")
+    problems.finish()
+    return text
+
+
+def _location(text: str, index: int, file: str) -> Location:
+    start = text.rfind("\n", 0, index) + 1
+    return Location(text.count("\n", 0, index) + 1, index - start + 1, file)
+
+
+def read(text: str, problems: Problems) -> Mapping:
+    """The top-level mapping of a spec. Raises `SpecError` where reading cannot go on."""
+    from ruamel.yaml import YAML
+    from ruamel.yaml.error import MarkedYAMLError, YAMLError
+
+    builder = _Builder(text, problems)
+    try:
+        for event in YAML(typ="safe", pure=True).parse(text):
+            builder.take(event)
+    except MarkedYAMLError as error:
+        raise builder.syntax_error(error) from None
+    except (YAMLError, ValueError, OverflowError) as error:
+        # Such as a directive or an escape with an absurd number.
+        raise problems.stop(f"not valid YAML: {shown(error, 200)}", Location(1, 1, problems.file)) from None
+    root = builder.root
+    if root is None or (isinstance(root, Scalar) and root.is_null):
+        raise problems.stop("the file is empty", Location(1, 1, problems.file), "phigen new NAME prints a starter spec")
+    if not isinstance(root, Mapping):
+        message = f"a spec is a mapping of keys to values, not {kind_of(root)}"
+        raise problems.stop(message, root.location, "phigen new NAME prints a starter spec")
+    return root
+
+
+class _Builder:
+    """Assembles nodes from ruamel's events, with a stack of the open collections."""
+
+    def __init__(self, text: str, problems: Problems) -> None:
+        self.text, self.problems = text, problems
+        self.root: Node | None = None
+        self.stack: list[tuple[Sequence | Mapping, list[Scalar | None]]] = []
+        self.count = 0
+        self.documents = 0
+
+    def place(self, mark: Any) -> Location:
+        """The location of one of ruamel's marks."""
+        return Location(mark.line + 1, mark.column + 1, self.problems.file)
+
+    def syntax_error(self, error: Any) -> Exception:
+        mark = error.problem_mark or error.context_mark
+        location = self.place(mark) if mark else Location(1, 1, self.problems.file)
+        what = " ".join(part for part in (error.context, error.problem) if part)
+        hint = "put expressions and texts with special characters between quotes"
+        if "\\t" in what or "'\t'" in what:
+            hint = "indent with spaces, not with tabs"
+        return self.problems.stop(f"not valid YAML: {what}", location, hint)
+
+    def take(self, event: Any) -> None:
+        """Handle one event."""
+        kind = type(event).__name__
+        if kind == "DocumentStartEvent":
+            self.start_document(event)
+        elif kind == "AliasEvent":
+            hint = "aliases are refused; an expression that starts with * needs quotes"
+            raise self.problems.stop(
+                f"the alias *{event.anchor[:60]} is not allowed", self.place(event.start_mark), hint
+            )
+        elif kind in ("SequenceEndEvent", "MappingEndEvent"):
+            self.stack.pop()
+        elif kind in ("ScalarEvent", "SequenceStartEvent", "MappingStartEvent"):
+            self.start_node(kind, event)
+
+    def start_document(self, event: Any) -> None:
+        place = self.place(event.start_mark)
+        self.documents += 1
+        if self.documents > 1:
+            raise self.problems.stop("a second YAML document starts here", place, "one spec per file: remove the ---")
+        if event.tags or (event.version and tuple(event.version) != (1, 2)):
+            raise self.problems.stop("YAML directives are not allowed; a spec is YAML 1.2", place, "remove the % lines")
+
+    def start_node(self, kind: str, event: Any) -> None:
+        place = self.place(event.start_mark)
+        if event.anchor is not None:
+            hint = "anchors are refused; an expression that starts with & needs quotes"
+            raise self.problems.stop(f"the anchor &{event.anchor[:60]} is not allowed", place, hint)
+        if event.tag is not None:
+            hint = "tags are refused; a text that starts with ! needs quotes"
+            raise self.problems.stop(f"the YAML tag {shown(event.tag)} is not allowed", place, hint)
+        self.count += 1
+        if self.count > limits.YAML_NODES:
+            raise self.problems.stop(f"more than {limits.YAML_NODES} YAML values", place, limit=True)
+        if kind == "ScalarEvent":
+            self.attach(Scalar(place, event.value, event.style is None, self.offset(event)))
+            return
+        if len(self.stack) >= limits.YAML_DEPTH:
+            raise self.problems.stop(f"YAML nested deeper than {limits.YAML_DEPTH} levels", place, limit=True)
+        node = Sequence(place) if kind == "SequenceStartEvent" else Mapping(place)
+        self.attach(node)
+        self.stack.append((node, [None]))
+
+    def offset(self, event: Any) -> int | None:
+        raw = self.text[event.start_mark.index : event.end_mark.index]
+        if raw == event.value:
+            return 0
+        return 1 if raw[:1] in ("'", '"') and raw[1:-1] == event.value else None
+
+    def attach(self, node: Node) -> None:
+        """Put a node into the innermost open collection."""
+        if not self.stack:
+            self.root = node
+            return
+        parent, pending = self.stack[-1]
+        if isinstance(parent, Sequence):
+            parent.items.append(node)
+        elif pending[0] is None:
+            if not isinstance(node, Scalar):
+                raise self.problems.stop(f"a key is a name, not {kind_of(node)}", node.location)
+            pending[0] = node
+        else:
+            key, pending[0] = pending[0], None
+            first = parent.entries.get(key.text)
+            if first is None:
+                parent.entries[key.text] = (key, node)
+            else:
+                where = f"line {first[0].location.line}, column {first[0].location.column}"
+                self.problems.add(f"the key {shown(key.text)} is given twice; the first is in {where}", key.location)
