@@ -43,13 +43,28 @@ class Diagnostic:
     severity: str = "error"
 
     def __str__(self) -> str:
-        head = f"{self.location}: {self.severity}: {self.message}" if self.location else f"{self.severity}: {self.message}"
+        head = (
+            f"{self.location}: {self.severity}: {self.message}" if self.location else f"{self.severity}: {self.message}"
+        )
         lines = [head]
         if self.location and self.source_line:
-            lines += [f"    {self.source_line}", "    " + " " * (self.location.column - 1) + "^"]
+            line, column = _excerpt(self.source_line, self.location.column - 1)
+            lines += [f"    {line}", "    " + " " * column + "^"]
         if self.hint:
             lines.append(f"  hint: {self.hint}")
         return "\n".join(lines)
+
+
+def _excerpt(line: str, column: int, width: int = 100) -> tuple[str, int]:
+    """The part of a long line around a column (from 0), and where the column is in it.
+
+    Whatever a terminal would not show as one character is replaced by one it does, so that the caret fits.
+    """
+    start = 0 if len(line) <= width else max(0, min(column - width // 2, len(line) - width))
+    part = "".join(c if c.isprintable() else " " if c == "\t" else "�" for c in line[start : start + width])
+    if start + width < len(line):
+        part += "…"
+    return ("…" + part, column - start + 1) if start else (part, column)
 
 
 class PhigenError(Exception):
