@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from phigen.errors import Diagnostic, SpecError
+from phigen.geometry import families, matrix_algebras
 from phigen.geometry.lie_algebra import LieAlgebra
 from phigen.geometry.shapes import Matrix, skew
 from phigen.spec.model import CanonicalForm, LieAlgebraForm, LogCanonicalForm, MatrixForm, NambuForm, PoissonForm
@@ -43,22 +44,15 @@ def algebra_of_form(form: PoissonForm, coordinates: Sequence[str]) -> LieAlgebra
     """
     if not isinstance(form, LieAlgebraForm):
         return None
-    from phigen.geometry import families, matrix_algebras
-
     if form.family:
+        # Before the matrices are built: so(1000) is a typing error that would take minutes.
+        _expect_dimension(f"{form.family}({form.size})", families.dimension(form.family, form.size), len(coordinates))
         algebra = families.named(form.family, form.size)
     elif form.matrices:
         algebra = matrix_algebras.from_matrices(form.matrices)
     else:
         algebra = matrix_algebras.from_structure_constants(len(coordinates), form.structure_constants)
-    if algebra.dimension != len(coordinates):
-        raise SpecError(
-            [
-                Diagnostic(
-                    f"{algebra.name} has dimension {algebra.dimension}, but there are {len(coordinates)} coordinates"
-                )
-            ]
-        )
+    _expect_dimension(algebra.name, algebra.dimension, len(coordinates))
     return algebra.opposite() if form.sign < 0 else algebra
 
 
@@ -76,7 +70,8 @@ def _canonical(coordinates: Sequence[str], q: Sequence[str], p: Sequence[str]) -
 def _nambu(coordinates: Sequence[str], casimirs: Sequence[Expression]) -> Matrix:
     """π_ij = det ∂(x_i, x_j, C_1, …, C_{n−2})/∂(x_1, …, x_n).
 
-    For n = 3 this is ẋ = ∇H×∇C up to the sign of the brackets: {x_1, x_2} = ∂C/∂x_3, so ẋ = ∇C... see `forms`.
+    That is {f, g} = det ∂(f, g, C_1, …, C_{n−2})/∂(x_1, …, x_n). For n = 3: {x_1, x_2} = ∂C/∂x_3 and cyclic,
+    so that ẋ = ∇H × ∇C. Raises `SpecError` unless there are n − 2 Casimirs.
     """
     n = len(coordinates)
     if len(casimirs) != n - 2:
@@ -101,6 +96,11 @@ def _determinant(rows: list[list[Expression]]) -> Expression:
             minor = _determinant([row[:k] + row[k + 1 :] for row in rows[1:]])
             terms.append(entry * minor if k % 2 == 0 else -(entry * minor))
     return total(terms)
+
+
+def _expect_dimension(name: str, dimension: int, coordinates: int) -> None:
+    if dimension != coordinates:
+        raise SpecError([Diagnostic(f"{name} has dimension {dimension}, but there are {coordinates} coordinates")])
 
 
 def _expect_square(rows: Sequence[Sequence[Expression]], n: int, what: str) -> None:

@@ -64,11 +64,11 @@ class LieAlgebra:
         n = range(self.dimension)
         return tuple(tuple(total(c * x[k] for k, c in sorted(self.bracket(i, j).items())) for j in n) for i in n)
 
-    def opposite(self, name: str = "") -> LieAlgebra:
+    def opposite(self) -> LieAlgebra:
         """The algebra with the negated bracket, represented by −ρ(E_i)."""
         rep = self.representation
         if rep is not None:
             negated = tuple({at: -v for at, v in m.items()} for m in rep.matrices)
             rep = Representation(f"minus {rep.name}", rep.size, negated)
         constants = {ij: {k: -c for k, c in row.items()} for ij, row in self.constants.items()}
-        return LieAlgebra(name or f"{self.name} with the opposite sign", self.dimension, constants, rep, self.labels)
+        return LieAlgebra(f"{self.name} with sign minus", self.dimension, constants, rep, self.labels)

@@ -123,7 +123,7 @@ def build_system(
         matrix = poisson_matrix(form, coordinates, algebra)
     except SpecError as error:
         raise _located(error, locations) from None
-    shape: Shape = LiePoisson(algebra) if algebra is not None else recognise(coordinates, matrix)
+    shape: Shape = LiePoisson(algebra) if algebra and algebra.constants else recognise(coordinates, matrix)
     taken = {*coordinates, *(p.name for p in parameters), *declared, *(invariants or {})}
     found, notes = found_casimirs(coordinates, matrix, shape, form, declared, taken)
     return System(

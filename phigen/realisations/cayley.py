@@ -1,14 +1,164 @@
-"""Placeholder until the Cayley chart is committed."""
+"""Linear π, the dual of a Lie algebra: the Cayley transform τ(P) = (1 − P/2)⁻¹(1 + P/2), P = Σ p_i E_i.
+
+In a faithful matrix representation with E_i, α_i = ⟨x, coordinates of (1 + P/2)E_i(1 − P/2)⟩, that is
+
+    α_i = x_i − ½(πp)_i − ¼⟨x, coordinates of P E_i P⟩,    β(x, p) = α(x, −p),    β − α = πp.
+
+This needs P E_i P in the algebra for all P, i.e. E_a E_i E_b + E_b E_i E_a ∈ g for all a, i, b: true for so(n),
+sp(2n), gl(n), sl(2), su(2), se(n), aff(n), heisenberg(n), and not for sl(3). The paper (example so(n)) prints 4 for 2.
+"""
 
 from __future__ import annotations
 
-from phigen.geometry.system import System
-from phigen.realisations.protocol import BiRealisation, refuse
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+
+from phigen.geometry.field import Field, Scalar
+from phigen.geometry.lie_algebra import LieAlgebra, Representation
+from phigen.geometry.linear import Span, add_multiple
+from phigen.geometry.representations import candidates, indecomposable_parts, restricted
+from phigen.geometry.shapes import LiePoisson
+from phigen.geometry.system import System, hamiltonian_vector_field
+from phigen.realisations.protocol import PAPER, BiRealisation, covector_symbols, refuse, reversed_covector
 from phigen.spec.model import BirealisationChoice
+from phigen.symbolic.expression import Expression, number, symbol
+from phigen.symbolic.horner import horner
 
 KIND = "cayley"
 
+Sparse = dict[tuple[int, int], Scalar]
+#: (i, a, b, k) with a ≤ b → the coefficient of p_a p_b x_k in ⟨x, coordinates of P E_i P⟩.
+Trilinear = dict[tuple[int, int, int, int], Expression]
+
+
+@dataclass(frozen=True)
+class _Escape:
+    """A product that is not in the algebra."""
+
+    i: int
+    a: int
+    b: int
+
 
 def build(system: System, choice: BirealisationChoice) -> BiRealisation:
-    """Not there yet."""
-    raise refuse("cayley is being written")
+    """The Cayley bi-realisation of a linear π; symmetric.
+
+    Raises `SpecError` if π is not linear, or no known faithful representation is closed under P E_i P; the
+    message names, for each representation tried, the element that leaves the algebra.
+    """
+    if not isinstance(system.shape, LiePoisson):
+        raise refuse(f"birealisation {KIND} needs a linear π, the dual of a Lie algebra; this π is {system.shape}")
+    terms, explanation = closed_product(system.shape.algebra)
+    n = system.dimension
+    x, p = [symbol(c) for c in system.coordinates], covector_symbols(system.coordinates)
+    increment = hamiltonian_vector_field(system.poisson, p)
+    displacement = []
+    for i in range(n):
+        quadratic = {
+            tuple((m == a) + (m == b) for m in range(n)) + tuple(int(m == k) for m in range(n)): c
+            for (row, a, b, k), c in terms.items()
+            if row == i
+        }
+        curvature = number(Fraction(1, 4)) * horner(quadratic, [*p, *x])
+        displacement.append(-(number(Fraction(1, 2)) * increment[i]) - curvature)
+    alpha = tuple(xi + d for xi, d in zip(x, displacement, strict=True))
+    return BiRealisation(
+        KIND,
+        system.coordinates,
+        alpha,
+        tuple(reversed_covector(alpha, system.coordinates)),
+        tuple(displacement),
+        increment,
+        symmetric=True,  # β is made by reversing p in α
+        explanation=f"π is linear: Cayley transform, {explanation}; symmetric",
+        reference=f"{PAPER}, the proposition on Lie–Poisson structures and its example so(n), with 2 for 4",
+    )
+
+
+def closed_product(algebra: LieAlgebra) -> tuple[Trilinear, str]:
+    """The trilinear form of P E_i P in the first closed representation, and which one that is.
+
+    Raises `SpecError` naming what was tried.
+    """
+    tried: dict[str, str] = {}
+    if algebra.representation is not None:
+        found = _product(algebra, algebra.representation)
+        if not isinstance(found, _Escape):
+            return found, f"with {algebra.representation.name}"
+        tried[algebra.representation.name] = _refusal(algebra, algebra.representation, found)
+    terms: Trilinear = {}
+    used: list[str] = []
+    for part in indecomposable_parts(algebra):
+        ideal = restricted(algebra, part)
+        for representation in candidates(ideal):
+            found = _product(ideal, representation)
+            if not isinstance(found, _Escape):
+                terms |= {(part[i], part[a], part[b], part[k]): c for (i, a, b, k), c in found.items()}
+                used.append(representation.name + _whose(ideal, algebra))
+                break
+            tried[representation.name] = _refusal(ideal, representation, found)
+        else:
+            tried = tried or {"": f"no faithful representation of {ideal.name} was found"}
+            raise refuse(
+                f"birealisation {KIND} does not apply to {algebra.name}: {'; '.join(tried.values())}",
+                "the kinds exponential and karasev, which need no representation, are planned; "
+                "a closed faithful representation can be given as lie_algebra: {matrices: […]}",
+            )
+    return terms, "with " + "; ".join(used)
+
+
+def _whose(ideal: LieAlgebra, algebra: LieAlgebra) -> str:
+    return f" for {', '.join(ideal.labels)}" if ideal.dimension < algebra.dimension else ""
+
+
+def _refusal(algebra: LieAlgebra, representation: Representation, escape: _Escape) -> str:
+    e_i, e_a, e_b = (algebra.label(m) for m in (escape.i, escape.a, escape.b))
+    product = f"{e_a}·{e_i}·{e_a}" if escape.a == escape.b else f"{e_a}·{e_i}·{e_b} + {e_b}·{e_i}·{e_a}"
+    return f"in {representation.name}, {product} leaves the algebra"
+
+
+def _product(algebra: LieAlgebra, representation: Representation) -> Trilinear | _Escape:
+    """The trilinear form of P E_i P, or the first product that is not in the algebra."""
+    field = Field(v for m in representation.matrices for v in m.values())
+    matrices: list[Sparse] = [{at: field.convert(v) for at, v in m.items()} for m in representation.matrices]
+    span = Span(field, matrices)
+    n = algebra.dimension
+    rows = [_by_row(m) for m in matrices]
+    terms: Trilinear = {}
+    for i in range(n):
+        left = [_times(matrices[a], rows[i]) for a in range(n)]  # E_a E_i
+        for a, b in _pairs(left, n):
+            image = _times(left[a], rows[b])
+            if a != b:
+                add_multiple(image, _times(left[b], rows[a]), field.one)
+            coordinates = span.coordinates(image)
+            if coordinates is None:
+                return _Escape(i, a, b)
+            for k, c in coordinates.items():
+                terms[i, a, b, k] = field.expression(c)
+    return terms
+
+
+def _pairs(left: Sequence[Sparse], n: int) -> Iterator[tuple[int, int]]:
+    return ((a, b) for a in range(n) for b in range(a, n) if left[a] or left[b])
+
+
+def _by_row(m: Sparse) -> dict[int, list[tuple[int, Scalar]]]:
+    rows: dict[int, list[tuple[int, Scalar]]] = {}
+    for (r, c), v in m.items():
+        rows.setdefault(r, []).append((c, v))
+    return rows
+
+
+def _times(a: Sparse, rows: dict[int, list[tuple[int, Scalar]]]) -> Sparse:
+    out: Sparse = {}
+    for (r, c), v in a.items():
+        for column, w in rows.get(c, ()):
+            at = r, column
+            value = out[at] + v * w if at in out else v * w
+            if value == 0:
+                del out[at]
+            else:
+                out[at] = value
+    return out

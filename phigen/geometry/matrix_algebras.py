@@ -1,0 +1,142 @@
+"""Lie algebras from matrices and from structure constants, with the checks that make them Lie algebras."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import combinations
+
+from phigen.errors import Diagnostic, SpecError
+from phigen.geometry.field import Field
+from phigen.geometry.lie_algebra import LieAlgebra, Representation, SparseMatrix
+from phigen.geometry.linear import Span, add_multiple
+from phigen.symbolic.expression import ZERO, Expression, total
+from phigen.symbolic.verdict import REFUTED, decide_zero, shortened
+
+Matrix = tuple[tuple[Expression, ...], ...]
+
+
+def from_matrices(matrices: Sequence[Matrix]) -> LieAlgebra:
+    """The algebra spanned by square matrices, its basis; entries may contain parameters.
+
+    Raises `SpecError` for sizes that differ, a linearly dependent matrix, and a commutator that leaves the
+    span (naming the pair).
+    """
+    size = len(matrices[0])
+    for i, m in enumerate(matrices):
+        if len(m) != size or any(len(row) != size for row in m):
+            raise SpecError([Diagnostic(f"lie_algebra matrices: E{i + 1} is not {size}×{size} like E1")])
+    sparse = [
+        {(r, c): entry for r, row in enumerate(m) for c, entry in enumerate(row) if not entry.is_zero} for m in matrices
+    ]
+    return algebra_of_sparse_matrices("the given algebra", size, sparse)
+
+
+def algebra_of_sparse_matrices(
+    name: str, size: int, matrices: Sequence[Mapping[tuple[int, int], Expression]]
+) -> LieAlgebra:
+    """`from_matrices` for matrices given by their non-zero entries (row, column) → value."""
+    field = Field(e for m in matrices for e in m.values())
+    converted = [{at: field.convert(e) for at, e in m.items()} for m in matrices]
+    span = Span(field, converted)
+    if span.dependent:
+        which = span.dependent[0]
+        raise SpecError([Diagnostic(f"lie_algebra matrices: E{which + 1} is a linear combination of the others before it")])
+    constants = {}
+    for i, j in combinations(range(len(matrices)), 2):
+        commutator = product(converted[i], converted[j])
+        add_multiple(commutator, product(converted[j], converted[i]), -field.one)
+        row = span.coordinates(commutator)
+        if row is None:
+            raise SpecError(
+                [
+                    Diagnostic(
+                        f"lie_algebra matrices: the commutator [E{i + 1}, E{j + 1}] is not in the span of the matrices",
+                        hint="a Lie algebra is closed under commutators; add the missing matrices",
+                    )
+                ]
+            )
+        if row:
+            constants[i, j] = {k: field.expression(c) for k, c in row.items()}
+    origin = f"the {size}×{size} matrices of {name}"
+    defining = Representation(origin, size, tuple(dict(m) for m in matrices))
+    return LieAlgebra(name, len(matrices), constants, defining)
+
+
+def product(a: SparseMatrix, b: SparseMatrix) -> SparseMatrix:
+    """The product of sparse matrices."""
+    rows: dict[int, list[tuple[int, object]]] = {}
+    for (r, c), v in b.items():
+        rows.setdefault(r, []).append((c, v))
+    out: SparseMatrix = {}
+    for (r, c), v in a.items():
+        add_multiple(out, {(r, column): w for column, w in rows.get(c, ())}, v)
+    return out
+
+
+def from_structure_constants(
+    dimension: int, given: Mapping[int, Mapping[int, Mapping[int, Expression]]]
+) -> LieAlgebra:
+    """The algebra with [E_i, E_j] = Σ_k given[i][j][k] E_k (from 0); pairs may be given in one order or both.
+
+    Raises `SpecError` for indices out of range, pairs that contradict antisymmetry, and a failing Jacobi
+    identity (naming the triple).
+    """
+    used = [i for i, row in given.items() for j, ks in row.items() for i in (i, j, *ks)]
+    if used and max(used) >= dimension:
+        raise SpecError([Diagnostic(f"structure constants use E{max(used) + 1}, but there are {dimension} coordinates")])
+    constants: dict[tuple[int, int], dict[int, Expression]] = {}
+    for i in range(dimension):
+        for j in range(i, dimension):
+            row = _bracket_of_pair(i, j, given)
+            if row:
+                constants[i, j] = row
+    algebra = LieAlgebra(f"a Lie algebra of dimension {dimension}", dimension, constants)
+    _expect_jacobi(algebra)
+    return algebra
+
+
+def _bracket_of_pair(
+    i: int, j: int, given: Mapping[int, Mapping[int, Mapping[int, Expression]]]
+) -> dict[int, Expression]:
+    forward, backward = given.get(i, {}).get(j), given.get(j, {}).get(i)
+    if i == j:
+        backward = None if forward is None else dict.fromkeys(forward, ZERO)
+    if forward is not None and backward is not None:
+        residuals = [
+            (f"E{k + 1}", forward.get(k, ZERO) + backward.get(k, ZERO)) for k in sorted({*forward, *backward})
+        ]
+        statement = decide_zero("antisymmetry", residuals)
+        if statement.verdict == REFUTED:
+            pair = f"[E{i + 1}, E{j + 1}]"
+            message = f"structure constants: {pair} = 0" if i == j else f"structure constants: {pair} = −[E{j + 1}, E{i + 1}]"
+            raise SpecError([Diagnostic(f"{message} does not hold in the component {statement.detail}")])
+    if i == j:
+        return {}
+    row = forward if forward is not None else {k: -c for k, c in (backward or {}).items()}
+    return {k: c for k, c in sorted(row.items()) if not c.is_zero}
+
+
+def _expect_jacobi(algebra: LieAlgebra) -> None:
+    for i, j, k in combinations(range(algebra.dimension), 3):
+        residuals = jacobi_residuals(algebra, i, j, k)
+        if residuals and decide_zero("Jacobi", [("", r) for r in residuals.values()]).verdict == REFUTED:
+            component, residual = next(iter(residuals.items()))
+            triple = f"(E{i + 1}, E{j + 1}, E{k + 1})"
+            raise SpecError(
+                [
+                    Diagnostic(
+                        f"structure constants: the Jacobi identity fails for {triple}; "
+                        f"the sum of the cyclic double brackets is not 0 in E{component + 1}: {shortened(residual)}"
+                    )
+                ]
+            )
+
+
+def jacobi_residuals(algebra: LieAlgebra, i: int, j: int, k: int) -> dict[int, Expression]:
+    """[[E_i, E_j], E_k] + cyclic, the components that are not literally 0."""
+    terms: dict[int, list[Expression]] = {}
+    for a, b, c in ((i, j, k), (j, k, i), (k, i, j)):
+        for m, v in algebra.bracket(a, b).items():
+            for out, w in algebra.bracket(m, c).items():
+                terms.setdefault(out, []).append(v * w)
+    return {m: s for m, parts in sorted(terms.items()) if not (s := total(parts)).is_zero}

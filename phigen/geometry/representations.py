@@ -1,0 +1,150 @@
+"""Faithful matrix representations of a Lie algebra, found from its structure constants.
+
+Each indecomposable part is represented on its own, by the first of these that is faithful and that the
+caller accepts: the defining matrices of a named family with the same structure constants (or the negated
+ones); the adjoint (no centre); the adjoint and nilpotent characters (centre outside [g, g]); the affine
+representation of a two-step nilpotent algebra.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import combinations
+
+from phigen.geometry.families import families_of_dimension, named
+from phigen.geometry.field import Field, Scalar
+from phigen.geometry.lie_algebra import LieAlgebra, Representation
+from phigen.geometry.linear import Span, kernel
+from phigen.symbolic.expression import Expression
+
+Sparse = dict[tuple[int, int], Scalar]
+#: Above this dimension named families are not built to be compared.
+_LARGEST_MATCHED = 45
+
+
+def candidates(algebra: LieAlgebra) -> Iterator[Representation]:
+    """Faithful representations, the preferred ones first; not the one that came with the algebra."""
+    yield from _matching_families(algebra)
+    field = algebra.field
+    adjoint = _adjoint(algebra, field)
+    centre = kernel(field, _rows_of(adjoint, field), algebra.dimension)
+    if not centre:
+        yield _named(f"the adjoint {algebra.dimension}×{algebra.dimension} matrices", algebra.dimension, adjoint, field)
+        return
+    yield from _with_characters(algebra, adjoint, centre, field)
+    yield from _two_step(algebra, adjoint, field)
+
+
+def indecomposable_parts(algebra: LieAlgebra) -> list[list[int]]:
+    """The finest partition of the basis into ideals spanned by basis elements; indices from 0, sorted."""
+    part = list(range(algebra.dimension))
+    for (i, j), row in algebra.constants.items():
+        joined = {part[m] for m in (i, j, *row)}
+        least = min(joined)
+        part = [least if p in joined else p for p in part]
+    return [[i for i, p in enumerate(part) if p == label] for label in sorted(set(part))]
+
+
+def restricted(algebra: LieAlgebra, part: Sequence[int]) -> LieAlgebra:
+    """The ideal spanned by some basis elements, with that basis."""
+    position = {i: new for new, i in enumerate(part)}
+    constants = {
+        (position[i], position[j]): {position[k]: c for k, c in row.items()}
+        for (i, j), row in algebra.constants.items()
+        if i in position
+    }
+    labels = tuple(algebra.label(i) for i in part)
+    name = algebra.name if len(part) == algebra.dimension else f"its part {', '.join(labels)}"
+    return LieAlgebra(name, len(part), constants, None, labels)
+
+
+def _matching_families(algebra: LieAlgebra) -> Iterator[Representation]:
+    if not algebra.field.is_rational or algebra.dimension > _LARGEST_MATCHED or not algebra.constants:
+        return
+    for family, size in families_of_dimension(algebra.dimension):
+        known = named(family, size)
+        for candidate in (known, known.opposite()):
+            rep = candidate.representation
+            if rep is not None and _plain(candidate) == _plain(algebra):
+                yield rep
+
+
+def _plain(algebra: LieAlgebra) -> dict[tuple[int, int], dict[int, Expression]]:
+    # Numbers are interned, so that equal constants are the same object.
+    return {ij: dict(row) for ij, row in algebra.constants.items() if row}
+
+
+def _adjoint(algebra: LieAlgebra, field: Field) -> list[Sparse]:
+    n = range(algebra.dimension)
+    return [{(k, j): field.convert(c) for j in n for k, c in algebra.bracket(i, j).items()} for i in n]
+
+
+def _rows_of(matrices: Sequence[Sparse], field: Field) -> list[dict[int, Scalar]]:
+    """Equations on v for Σ v_i·matrices[i] = 0."""
+    rows: dict[tuple[int, int], dict[int, Scalar]] = {}
+    for i, m in enumerate(matrices):
+        for at, v in m.items():
+            rows.setdefault(at, {})[i] = v
+    return [rows[at] for at in sorted(rows)]
+
+
+def _with_characters(
+    algebra: LieAlgebra, adjoint: list[Sparse], centre: list[dict[int, Scalar]], field: Field
+) -> Iterator[Representation]:
+    """The adjoint, and for each central direction a 2×2 block (0 χ; 0 0) of a form χ that vanishes on [g, g].
+
+    A nilpotent block costs nothing in PE_iP, where a diagonal one would add a cubic term.
+    """
+    derived = [{k: field.convert(c) for k, c in row.items()} for row in algebra.constants.values()]
+    chosen: list[dict[int, Scalar]] = []
+    seen: list[dict[int, Scalar]] = []  # values of the chosen forms on the centre
+    for form in kernel(field, derived, algebra.dimension):
+        values = {m: v for m, z in enumerate(centre) if (v := _pairing(form, z, field)) != 0}
+        if values and not Span(field, [*seen, values]).dependent:
+            chosen.append(form)
+            seen.append(values)
+    if len(chosen) < len(centre):
+        return
+    n = algebra.dimension
+    matrices = [dict(m) for m in adjoint]
+    for extra, form in enumerate(chosen):
+        for i, value in form.items():
+            matrices[i][n + 2 * extra, n + 2 * extra + 1] = value
+    yield _named(f"the adjoint matrices and {len(chosen)} nilpotent character(s)", n + 2 * len(chosen), matrices, field)
+
+
+def _pairing(form: dict[int, Scalar], vector: dict[int, Scalar], field: Field) -> Scalar:
+    result = field.zero
+    for i, v in form.items():
+        if i in vector:
+            result = result + v * vector[i]
+    return result
+
+
+def _two_step(algebra: LieAlgebra, adjoint: list[Sparse], field: Field) -> Iterator[Representation]:
+    """X ↦ (½ad_X X; 0 0) on g ⊕ R, which represents g when [[g, g], g] = 0."""
+    derived = [set(row) for row in algebra.constants.values()]
+    touched = sorted({k for row in derived for k in row})
+    if any(adjoint[k] for k in touched) and not _is_two_step(algebra, adjoint, field):
+        return
+    n = algebra.dimension
+    half = field.one / field.number(2)
+    matrices = [{at: v * half for at, v in m.items()} | {(i, n): field.one} for i, m in enumerate(adjoint)]
+    yield _named("the affine matrices of a two-step nilpotent algebra", n + 1, matrices, field)
+
+
+def _is_two_step(algebra: LieAlgebra, adjoint: list[Sparse], field: Field) -> bool:
+    for i, j in combinations(range(algebra.dimension), 2):
+        image: Sparse = {}
+        for k, c in algebra.bracket(i, j).items():
+            for at, v in adjoint[k].items():
+                image[at] = image.get(at, field.zero) + field.convert(c) * v
+        if any(v != 0 for v in image.values()):
+            return False
+    return True
+
+
+def _named(name: str, size: int, matrices: Sequence[Sparse], field: Field) -> Representation:
+    return Representation(
+        name, size, tuple({at: field.expression(v) for at, v in sorted(m.items())} for m in matrices)
+    )
