@@ -30,7 +30,20 @@ _HOMES = {
     "ToolchainError": "phigen.errors",
 }
 
-__all__ = ["__version__", *_HOMES]
+__all__ = [
+    "CheckError",
+    "LimitError",
+    "PhigenError",
+    "Solver",
+    "SpecError",
+    "StepError",
+    "System",
+    "ToolchainError",
+    "Trajectory",
+    "__version__",
+    "compile",
+    "load",
+]
 
 
 def __getattr__(name: str) -> Any:

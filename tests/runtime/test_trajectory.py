@@ -1,0 +1,45 @@
+import csv
+
+import numpy as np
+import pytest
+
+from phigen.runtime.trajectory import Trajectory
+
+
+@pytest.fixture
+def trajectory():
+    t = 0.1 * np.arange(3)
+    x = np.array([[0.1, 1 / 3], [1e-300, -0.0], [2.0, 5e22]])
+    return Trajectory(
+        t=t, x=x, energy=x.sum(axis=1), casimirs={"C": x[:, 0] / 7}, steps=2, h=0.1,
+        parameters={"k": 2.0}, coordinates=("q", "p"),
+    )  # fmt: skip
+
+
+def test_csv_reads_back_bit_for_bit(trajectory, tmp_path):
+    trajectory.save(tmp_path / "run.csv")
+    with (tmp_path / "run.csv").open(newline="") as file:
+        header, *rows = csv.reader(file)
+    assert header == ["t", "q", "p", "energy", "C"]
+    expected = np.column_stack([trajectory.t, trajectory.x, trajectory.energy, trajectory.casimirs["C"]])
+    assert np.array(rows, dtype=float).tobytes() == expected.tobytes()
+
+
+def test_npz_reads_back(trajectory, tmp_path):
+    trajectory.save(str(tmp_path / "run.NPZ"))
+    with np.load(tmp_path / "run.NPZ", allow_pickle=False) as data:
+        np.testing.assert_array_equal(data["x"], trajectory.x)
+        np.testing.assert_array_equal(data["casimir_C"], trajectory.casimirs["C"])
+        assert data["coordinates"].tolist() == ["q", "p"]
+        assert (int(data["steps"]), float(data["h"]), float(data["parameter_k"])) == (2, 0.1, 2.0)
+
+
+def test_other_suffixes_are_refused(trajectory, tmp_path):
+    with pytest.raises(ValueError, match=r"\.csv or \.npz"):
+        trajectory.save(tmp_path / "run.txt")
+
+
+def test_columns_are_found_by_name(trajectory):
+    assert trajectory.column("p").tolist() == trajectory.x[:, 1].tolist()
+    with pytest.raises(KeyError, match="q, p"):
+        trajectory.column("z")

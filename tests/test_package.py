@@ -1,0 +1,25 @@
+import subprocess
+import sys
+
+import pytest
+
+import phigen
+from phigen import resources
+
+
+def test_importing_phigen_loads_neither_numpy_nor_sympy():
+    code = "import sys, phigen; phigen.SpecError; sys.exit(any(m in sys.modules for m in ('numpy', 'sympy', 'click')))"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_public_names_are_found():
+    from phigen.errors import StepError
+
+    assert phigen.StepError is StepError
+    assert "Trajectory" in dir(phigen)
+    with pytest.raises(AttributeError, match="nonsense"):
+        phigen.nonsense  # noqa: B018
+
+
+def test_bundled_specs_are_found():
+    assert (resources.bundled_specs() / "rigid_body.yaml").is_file()
