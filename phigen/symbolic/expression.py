@@ -149,6 +149,11 @@ def _commuting_key(e: Expression) -> tuple[Any, ...]:
     return (_RANK.get(e.op, 3), name, e.depth, e.digest)
 
 
+def raw(op: str, args: tuple[Expression, ...], value: Any = None) -> Expression:
+    """A node as it stands, without simplification: for lowering, where a form has been decided."""
+    return _node(op, args, value)
+
+
 def number(value: Number) -> Expression:
     """A literal rational number."""
     return _node("number", (), Fraction(value))

@@ -1,0 +1,84 @@
+"""The pipeline, on one screen.
+
+    spec file ─► Spec ─► System ─► BiRealisation ─► Program ─► source files
+
+Each stage is a function from one frozen dataclass to the next; `Compilation` keeps what each of them made and the
+seconds it took. The Hamilton–Jacobi series and the staging happen inside `build_program`.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TypeVar
+
+from phigen import spec as specs
+from phigen.geometry.system import System, system_from_spec
+from phigen.realisations.catalogue import realise
+from phigen.realisations.protocol import BiRealisation
+from phigen.scheme.assemble import Order, build_program, plan_order
+from phigen.scheme.program import Program
+from phigen.spec.model import Spec
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Compilation:
+    """Everything that compiling one spec made, stage by stage; ``seconds`` maps stages to their time."""
+
+    spec: Spec
+    system: System
+    realisation: BiRealisation
+    order: Order
+    program: Program
+    seconds: Mapping[str, float] = field(default_factory=dict)
+
+
+def compile_spec(spec: Spec, *, order: int | None = None) -> Compilation:
+    """Compile a spec; ``order`` overrides the order (and the terms) that it asks for.
+
+    Raises `SpecError` (no bi-realisation applies, …) and `LimitError` (the program would be too large).
+    """
+    seconds: dict[str, float] = {}
+
+    def timed(stage: str, work: Callable[[], T]) -> T:
+        start = time.perf_counter()
+        result = work()
+        seconds[stage] = time.perf_counter() - start
+        return result
+
+    system = timed("system", lambda: system_from_spec(spec))
+    realisation = timed("bi-realisation", lambda: realise(system, spec.birealisation))
+    plan = plan_order(order or spec.order, None if order else spec.terms, symmetric=realisation.symmetric)
+    program = timed(
+        "program",
+        lambda: build_program(
+            system,
+            realisation,
+            plan,
+            solver=spec.solver,
+            title=spec.title,
+            licence=spec.license,
+            spec_sha256=spec.source_sha256,
+        ),
+    )
+    return Compilation(spec, system, realisation, plan, program, seconds)
+
+
+def compile_file(path: str | Path, *, order: int | None = None) -> Compilation:
+    """`compile_spec` for a file."""
+    return compile_spec(specs.load(path), order=order)
+
+
+def emit(program: Program, target: str, command: str, *, single_file: bool = False) -> dict[str, str]:
+    """The files of one target (``c`` or ``numpy``), by name; ``command`` is what regenerates them."""
+    if target == "c":
+        from phigen.targets.c import emitter as c
+
+        return c.emit(program, command, single_file=single_file)
+    from phigen.targets.numpy import emitter as numpy
+
+    return numpy.emit(program, command)

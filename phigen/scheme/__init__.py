@@ -1,0 +1,1 @@
+"""The one-step map as a staged straight-line program."""

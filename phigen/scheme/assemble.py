@@ -1,0 +1,229 @@
+"""From a system, its bi-realisation and an order to a program: series, staging and the step put together."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from phigen.errors import Diagnostic, LimitError
+from phigen.geometry.shapes import LogCanonical
+from phigen.geometry.system import System
+from phigen.realisations.protocol import BiRealisation
+from phigen.scheme.generating import STEP, GeneratingFunction, collected_form, graph_form
+from phigen.scheme.lowering import cost, operation_counts
+from phigen.scheme.program import Kernel, Output, Program
+from phigen.scheme.staging import Coefficients
+from phigen.scheme.step import (
+    at_momenta,
+    elimination,
+    explicit_increment,
+    explicit_order,
+    linearise,
+)
+from phigen.series.hamilton_jacobi import PolynomialSeries, graph_series, polynomial_series
+from phigen.spec.model import SolverOptions
+from phigen.symbolic.expression import Expression
+
+#: Most operations in one kernel; about 5 MB of C and a minute of compilation.
+MOST_OPERATIONS = 100_000
+
+#: Largest dimension whose elimination is unrolled.
+UNROLLED = 4
+
+#: The graph form is tried up to this many terms, and beyond only if the collected form is too large.
+GRAPH_TERMS = 5
+
+
+@dataclass(frozen=True)
+class Order:
+    """The order of the method and the number of terms S_1 … S_k that give it."""
+
+    order: int
+    terms: int
+    note: str = ""
+
+
+def plan_order(order: int | None, terms: int | None, *, symmetric: bool) -> Order:
+    """The terms that an order needs, or the order that terms give.
+
+    In a symmetric bi-realisation the even S_i vanish and the method is symmetric, so its order is even:
+    S_1 … S_k with k odd gives order k + 1. Otherwise S_1 … S_k gives order k.
+    """
+    if terms is not None:
+        if not symmetric:
+            return Order(terms, terms)
+        kept = terms if terms % 2 else terms - 1 or 1
+        note = "" if kept == terms else f"S_{terms} = 0 in a symmetric bi-realisation"
+        return Order(kept + 1, kept, note)
+    order = order or 2
+    if not symmetric:
+        return Order(order, order)
+    if order % 2:
+        return Order(order + 1, order, f"order {order} was asked for; a symmetric method has even order")
+    return Order(order, order - 1)
+
+
+def series_of(system: System, realisation: BiRealisation, terms: int) -> PolynomialSeries:
+    """S_1 … S_terms in a tower that also contains the step size."""
+    return polynomial_series(
+        system.hamiltonian,
+        realisation.alpha,
+        system.coordinates,
+        [*system.parameter_names, STEP],
+        terms,
+        symmetric=realisation.symmetric,
+    )
+
+
+def generating_function(system: System, realisation: BiRealisation, terms: int) -> GeneratingFunction:
+    """∇S_h and Hess S_h in the cheapest form."""
+    static = system.parameter_names
+    candidates = collected_form(series_of(system, realisation, terms), system.coordinates, static)
+    if terms <= GRAPH_TERMS or not candidates:
+        graph = graph_series(
+            system.hamiltonian, realisation.alpha, system.coordinates, terms, symmetric=realisation.symmetric
+        )
+        candidates.append(graph_form(graph, system.coordinates, static))
+    return min(candidates, key=GeneratingFunction.cost)
+
+
+def build_program(
+    system: System,
+    realisation: BiRealisation,
+    order: Order,
+    *,
+    solver: SolverOptions | None = None,
+    title: str = "",
+    licence: str = "0BSD",
+    spec_sha256: str = "",
+) -> Program:
+    """The solver of a system as a program. LimitError if a kernel exceeds `MOST_OPERATIONS`."""
+    solver = solver or SolverOptions()
+    generating = generating_function(system, realisation, order.terms)
+    coefficients = generating.coefficients
+    kernels = _step_kernels(system, realisation, generating, coefficients)
+    driver = "explicit" if "explicit" in kernels else "newton"
+    kernels |= _observables(system)
+    prepare = Kernel(
+        "prepare",
+        "everything that depends on parameters and step size only",
+        {"params": system.parameter_names, "h": (STEP,)},
+        (Output("coef", tuple(coefficients.values)),),
+    )
+    main = kernels[driver if driver == "explicit" else "linearise"]
+    for kernel in (prepare, main):
+        _within_budget(kernel, system)
+    facts = [
+        f"bi-realisation: {realisation.kind}, {'symmetric' if realisation.symmetric else 'not symmetric'}",
+        f"generating function: S_1 ... S_{order.terms} ({generating.form}"
+        + (f", {generating.terms} terms)" if generating.terms else ")"),
+        f"step: {driver if driver == 'explicit' else 'implicit, Newton iteration with the analytic matrix'}",
+    ]
+    return Program(
+        name=system.name,
+        title=title,
+        coordinates=system.coordinates,
+        parameters=system.parameters,
+        casimirs=tuple(system.casimirs),
+        order=order.order,
+        driver=driver,
+        coefficients=len(coefficients.values),
+        kernels={"prepare": prepare, **kernels},
+        relative=isinstance(system.shape, LogCanonical),
+        symmetric=realisation.symmetric,
+        max_iterations=solver.max_iterations,
+        tolerance=1e-17 if solver.tolerance is None else float(solver.tolerance),
+        license=licence,
+        spec_sha256=spec_sha256,
+        facts=tuple([*facts, order.note] if order.note else facts),
+        operations=operation_counts(main.roots),
+    )
+
+
+def _within_budget(kernel: Kernel, system: System) -> None:
+    operations = cost(kernel.roots)
+    if operations > MOST_OPERATIONS:
+        raise LimitError(
+            [
+                Diagnostic(
+                    f"the kernel {kernel.name} would take {operations} operations, more than {MOST_OPERATIONS}",
+                    system.locations.get(("order",)),
+                    "ask for a lower order",
+                )
+            ]
+        )
+
+
+def _step_kernels(
+    system: System, realisation: BiRealisation, generating: GeneratingFunction, coefficients: Coefficients
+) -> dict[str, Kernel]:
+    n, coordinates = system.dimension, system.coordinates
+    displacement = at_momenta(realisation.displacement, coordinates, generating.slope)
+    sequence = explicit_order(displacement, coordinates)
+    if sequence is not None:
+        increment = at_momenta(realisation.increment, coordinates, generating.slope)
+        values = coefficients.hoist(explicit_increment(displacement, increment, coordinates, sequence))
+        return {
+            "explicit": Kernel(
+                "explicit",
+                "the increment of one step from the state",
+                {"coef": _slots(coefficients), "state": coordinates},
+                (Output("increment", tuple(values)),),
+            )
+        }
+    point = linearise(realisation.displacement, realisation.increment, coordinates, generating)
+    flat = [
+        *point.displacement,
+        *point.increment,
+        *(e for row in point.jacobian for e in row),
+        *(e for row in point.increment_jacobian for e in row),
+        *generating.slope,
+    ]
+    flat = coefficients.hoist(flat)
+    sizes = (n, n, n * n, n * n)
+    outputs = _outputs(flat, ("displacement", "increment", "jacobian", "increment_jacobian"), sizes)
+    named = tuple((f"p_{c}", e) for c, e in zip(coordinates, flat[sum(sizes) :], strict=True))
+    kernels = {
+        "linearise": Kernel(
+            "linearise",
+            "at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the "
+            "increment, all with the momenta p = grad S_h(y)",
+            {"coef": _slots(coefficients), "y": coordinates},
+            outputs,
+            named,
+        )
+    }
+    if n <= UNROLLED:
+        solution, reciprocals = elimination(n)
+        kernels["eliminate"] = Kernel(
+            "eliminate",
+            "elimination without pivoting: the solution, and the reciprocals of the pivots",
+            {
+                "matrix": tuple(f"J:{i}:{j}" for i in range(n) for j in range(n)),
+                "side": tuple(f"r:{i}" for i in range(n)),
+            },
+            (Output("solution", tuple(solution)), Output("reciprocal", tuple(reciprocals))),
+        )
+    return kernels
+
+
+def _slots(coefficients: Coefficients) -> tuple[str, ...]:
+    return tuple(f"c:{k}" for k in range(len(coefficients.values)))
+
+
+def _outputs(values: Sequence[Expression], names: Sequence[str], sizes: Sequence[int]) -> tuple[Output, ...]:
+    result, start = [], 0
+    for name, size in zip(names, sizes, strict=True):
+        result.append(Output(name, tuple(values[start : start + size])))
+        start += size
+    return tuple(result)
+
+
+def _observables(system: System) -> dict[str, Kernel]:
+    inputs = {"params": system.parameter_names, "x": system.coordinates}
+    field = system.vector_field()
+    return {
+        "energy": Kernel("energy", "the Hamiltonian", inputs, (Output("energy", (system.hamiltonian,)),)),
+        "casimirs": Kernel("casimirs", "the Casimirs", inputs, (Output("out", tuple(system.casimirs.values())),)),
+        "vector_field": Kernel("vector_field", "pi(x) grad H(x)", inputs, (Output("out", field),)),
+    }

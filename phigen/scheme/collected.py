@@ -1,0 +1,60 @@
+"""Collected polynomials: monomials in state-dependent variables over state-independent coefficients.
+
+The coefficients are expressions in parameters and step size. Differentiation multiplies them by integers or by
+coefficients of the generators' derivatives, so the coefficients of a gradient and a Hessian share those
+of the function itself, and ``prepare`` computes each of them once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from phigen.scheme.staging import Coefficients
+from phigen.symbolic.expression import Expression, number, symbol
+from phigen.symbolic.horner import Monomial, horner
+from phigen.symbolic.tower import Poly, Tower, rational
+
+Terms = Mapping[Monomial, Expression]
+
+
+@dataclass(frozen=True)
+class Collected:
+    """A ring of collected polynomials: its variables, and the derivative of each along each coordinate."""
+
+    variables: tuple[Expression, ...]
+    slopes: tuple[tuple[Terms, ...], ...]  # slopes[v][j] = ∂variable_v / ∂x_j
+
+    def derivative(self, terms: Terms, j: int) -> Terms:
+        """The total derivative along coordinate j."""
+        result: dict[Monomial, Expression] = {}
+        for m, c in terms.items():
+            for v, e in enumerate(m):
+                if e:
+                    rest = (*m[:v], e - 1, *m[v + 1 :])
+                    for k, factor in self.slopes[v][j].items():
+                        key = tuple(a + b for a, b in zip(rest, k, strict=True))
+                        term = e * c * factor
+                        result[key] = result[key] + term if key in result else term
+        return {m: c for m, c in result.items() if not c.is_zero}
+
+    def expression(self, terms: Terms, coefficients: Coefficients) -> Expression:
+        """The polynomial in nested Horner form, its coefficients put into the table."""
+        return horner({m: coefficients.slot(c) for m, c in terms.items()}, self.variables)
+
+
+def collect(tower: Tower, elements: Sequence[Poly], coordinates: Sequence[str]) -> tuple[Collected, list[Terms]]:
+    """Elements of a tower as collected polynomials, with the ring that differentiates them."""
+    state = [i for i in range(len(tower.names)) if tower.depends_on(tower.gens[i], coordinates)]
+    static = [i for i in range(len(tower.names)) if i not in state]
+    values = [symbol(n) for n in tower.symbols] + [g.expression for g in tower.generators]
+
+    def terms(element: Poly) -> Terms:
+        groups: dict[Monomial, dict[Monomial, Expression]] = {}
+        for m, c in element.to_dict().items():
+            key = tuple(int(m[i]) for i in state)
+            groups.setdefault(key, {})[tuple(int(m[i]) for i in static)] = number(rational(c))
+        return {key: horner(part, [values[i] for i in static]) for key, part in sorted(groups.items())}
+
+    slopes = tuple(tuple(terms(tower.derivative(tower.gens[i], c)) for c in coordinates) for i in state)
+    return Collected(tuple(values[i] for i in state), slopes), [terms(e) for e in elements]

@@ -1,0 +1,92 @@
+"""The generating function S_h = Σ h^i S_i as code: gradient and Hessian in the cheapest form.
+
+Two forms compete. *Collected*: S_h as one polynomial in coordinates and function values whose coefficients
+depend on parameters and h only, so that ``prepare`` collapses all orders into one set of numbers; each
+derivative is a nested Horner form. *Graph*: the recursion itself, never expanded, differentiated as a
+graph. In low dimension collected polynomials win by far; in high dimension expansion explodes and the
+graph wins. The decision is by operation count.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from phigen.scheme.collected import collect
+from phigen.scheme.lowering import cost
+from phigen.scheme.staging import Coefficients
+from phigen.series.hamilton_jacobi import PolynomialSeries
+from phigen.symbolic.expression import Expression, derivatives, gradient, symbol, total
+
+#: The step size, as a symbol.
+STEP = "h:"
+
+#: A collected form with more terms than this is not tried: its Hessian would take minutes to print.
+MOST_TERMS = 20_000
+
+
+@dataclass(frozen=True)
+class GeneratingFunction:
+    """∇S_h (``slope``) and Hess S_h (``hessian``, full n×n) as expressions, and how they were written.
+
+    ``coefficients`` is the table that their symbols ``c:k`` refer to.
+    """
+
+    slope: tuple[Expression, ...]
+    hessian: tuple[tuple[Expression, ...], ...]
+    form: str
+    terms: int
+    coefficients: Coefficients
+
+    def cost(self) -> int:
+        """Cost of one evaluation of gradient and Hessian, after staging."""
+        roots = [*self.slope, *(e for i, row in enumerate(self.hessian) for e in row[i:])]
+        return cost(self.coefficients.hoist(roots))
+
+
+def collected_form(
+    series: PolynomialSeries, coordinates: Sequence[str], static: Sequence[str]
+) -> list[GeneratingFunction]:
+    """The collected gradient, with the Hessian collected entry by entry, and with the Hessian by differentiation."""
+    tower, n = series.tower, len(coordinates)
+    h = tower.variable(STEP)
+    s = tower.combine(term * h ** (i + 1) for i, term in enumerate(series.terms))
+    if len(s) > MOST_TERMS:
+        return []
+    ring, (terms,) = collect(tower, [s], coordinates)
+    first = [ring.derivative(terms, j) for j in range(n)]
+    found = []
+    for entrywise in (True, False):
+        table = Coefficients([*static, STEP])
+        slope = tuple(ring.expression(g, table) for g in first)
+        if entrywise:
+            hessian = _symmetric(
+                [[ring.expression(ring.derivative(first[i], j), table) for j in range(i, n)] for i in range(n)]
+            )
+        else:
+            hessian = _differentiated(slope, coordinates)
+        found.append(GeneratingFunction(slope, hessian, "collected polynomial", len(terms), table))
+    return found
+
+
+def graph_form(
+    series: Sequence[Expression], coordinates: Sequence[str], static: Sequence[str]
+) -> GeneratingFunction:
+    """Gradient by reverse, Hessian by repeated reverse differentiation of the shared graph."""
+    h = symbol(STEP)
+    s = total(h ** (i + 1) * term for i, term in enumerate(series) if not term.is_zero)
+    slope = tuple(gradient(s, coordinates))
+    rows = [gradient(slope[i], coordinates[i:]) for i in range(len(coordinates))]  # one reverse sweep a row
+    return GeneratingFunction(slope, _symmetric(rows), "shared graph", 0, Coefficients([*static, STEP]))
+
+
+def _differentiated(slope: Sequence[Expression], coordinates: Sequence[str]) -> tuple[tuple[Expression, ...], ...]:
+    columns = [derivatives(slope[: j + 1], c) for j, c in enumerate(coordinates)]
+    n = len(coordinates)
+    return tuple(tuple(columns[max(i, j)][min(i, j)] for j in range(n)) for i in range(n))
+
+
+def _symmetric(rows: Sequence[Sequence[Expression]]) -> tuple[tuple[Expression, ...], ...]:
+    """The full matrix of upper-triangular rows: ``rows[i][j - i]`` for j ≥ i."""
+    n = len(rows)
+    return tuple(tuple(rows[min(i, j)][abs(i - j)] for j in range(n)) for i in range(n))

@@ -1,0 +1,143 @@
+"""Lowering: from expression graphs to assignments that a target prints as they stand.
+
+Passes, in order: `expand_powers` (powers become products, quotients and square roots), then `assign` (shared or
+long sub-expressions become temporaries). The result is a list of trees over symbols.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+
+from phigen.symbolic.expression import Expression, fold, raw, symbol, topological
+
+#: Cost of an operation in units of one addition, as measured on current x86-64 processors (throughput).
+COST = {"add": 1, "sub": 1, "mul": 1, "neg": 0, "reciprocal": 4, "sqrt": 5, "call": 20}
+
+#: Longest tree that is printed as one statement, in operations.
+LONGEST = 14
+
+
+@dataclass(frozen=True)
+class Assignment:
+    """``target`` = ``value``; the value is a tree over symbols, temporaries of earlier assignments included."""
+
+    target: str
+    value: Expression
+
+
+def expand_powers(roots: Sequence[Expression]) -> list[Expression]:
+    """The roots with only these powers left: 2 (a square), −1, ½, ⅓ and powers that need the function."""
+
+    def visit(e: Expression, args: list[Expression]) -> Expression:
+        if e.op == "pow":
+            return _power(args[0], e.value)
+        return raw(e.op, tuple(args), e.value) if e.args else e
+
+    return fold(roots, visit)
+
+
+def _power(base: Expression, exponent: Fraction) -> Expression:
+    if exponent < 0:
+        if exponent.denominator == 1:
+            return raw("pow", (_power(base, -exponent),), Fraction(-1))
+        # One reciprocal root, then products: r**(-3/2) is (1/sqrt(r))**3.
+        root = _root(base, exponent.denominator)
+        if root is not None:
+            return _integer_power(raw("pow", (root,), Fraction(-1)), -exponent.numerator)
+        return raw("pow", (base,), exponent)
+    if exponent.denominator == 1:
+        return _integer_power(base, int(exponent))
+    root = _root(base, exponent.denominator)
+    if root is None:
+        return raw("pow", (base,), exponent)
+    whole, rest = divmod(exponent.numerator, exponent.denominator)
+    part = _integer_power(root, rest)
+    return part if whole == 0 else raw("mul", (_integer_power(base, whole), part))
+
+
+def _root(base: Expression, degree: int) -> Expression | None:
+    return raw("pow", (base,), Fraction(1, degree)) if degree in (2, 3) else None
+
+
+def _integer_power(base: Expression, n: int) -> Expression:
+    if n == 1:
+        return base
+    half = _integer_power(base, n // 2)
+    square = raw("pow", (half,), Fraction(2))
+    return square if n % 2 == 0 else raw("mul", (base, square))
+
+
+def cost(roots: Sequence[Expression]) -> int:
+    """Cost of computing the roots together, each shared value once (see `COST`)."""
+    return sum(_cost(e) for e in topological(expand_powers(roots)))
+
+
+def _cost(e: Expression) -> int:
+    if not e.args:
+        return 0
+    if e.op == "pow":
+        return {Fraction(2): 1, Fraction(-1): COST["reciprocal"], Fraction(1, 2): COST["sqrt"]}.get(
+            e.value, COST["call"]
+        )
+    return COST.get(e.op, COST["call"])
+
+
+def operation_counts(roots: Sequence[Expression]) -> dict[str, int]:
+    """Additions, multiplications, divisions and function calls of the roots together."""
+    counts = {"additions": 0, "multiplications": 0, "divisions": 0, "functions": 0}
+    for e in topological(expand_powers(roots)):
+        if e.op in ("add", "sub"):
+            counts["additions"] += 1
+        elif e.op == "mul" or (e.op == "pow" and e.value == 2):
+            counts["multiplications"] += 1
+        elif e.op == "pow" and e.value == -1:
+            counts["divisions"] += 1
+        elif e.args and e.op != "neg":
+            counts["functions"] += 1
+    return counts
+
+
+def assign(
+    roots: Sequence[Expression], named: Mapping[int, str] | None = None, prefix: str = "t"
+) -> tuple[list[Assignment], list[Expression]]:
+    """Assignments of temporaries, and the roots as trees over them.
+
+    A value used more than once, a value with a name in ``named`` (by ``id`` of the node in ``roots``' graph),
+    the operand of a square, and a value whose tree would exceed `LONGEST` operations get a temporary.
+    The roots must have passed `expand_powers`.
+    """
+    named = named or {}
+    order = topological(roots)
+    uses: dict[int, int] = {}
+    for e in order:
+        for a in e.args:
+            uses[id(a)] = uses.get(id(a), 0) + (2 if e.op == "pow" and e.value == 2 else 1)
+    for r in roots:
+        uses[id(r)] = uses.get(id(r), 0) + 1
+    assignments: list[Assignment] = []
+    trees: dict[int, Expression] = {}
+    sizes: dict[int, int] = {}
+    count = 0
+    for e in order:
+        if not e.args:
+            trees[id(e)], sizes[id(e)] = e, 0
+            continue
+        args = [trees[id(a)] for a in e.args]
+        tree = raw(e.op, tuple(args), e.value)
+        size = 1 + sum(sizes[id(a)] for a in e.args)
+        cheap = e.op == "neg" and not args[0].args
+        if id(e) in named or (uses[id(e)] > 1 and not cheap) or size > LONGEST:
+            if id(e) in named:
+                target = named[id(e)]
+            else:
+                count += 1
+                target = f"{prefix}:{count}"
+            assignments.append(Assignment(target, tree))
+            tree, size = symbol(target), 0
+        trees[id(e)], sizes[id(e)] = tree, size
+    return assignments, [trees[id(r)] for r in roots]
+
+
+__all__ = ["Assignment", "assign", "cost", "expand_powers", "operation_counts"]

@@ -1,0 +1,48 @@
+"""Staging: values that do not depend on the state move to ``prepare``."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from phigen.symbolic.expression import Expression, fold, rebuild, substitute, symbol, topological
+
+
+class Coefficients:
+    """The table of state-independent values; `hoist` fills it and is idempotent on equal values."""
+
+    def __init__(self, static: Iterable[str]) -> None:
+        self._static = set(static)
+        self.values: list[Expression] = []
+        self._index: dict[int, int] = {}
+
+    def hoist(self, roots: Sequence[Expression]) -> list[Expression]:
+        """The roots with each largest state-independent part replaced by a coefficient ``c:k``.
+
+        Plain numbers stay where they are: a literal is cheaper than a load.
+        """
+        fixed: dict[int, bool] = {}
+        for e in topological(roots):
+            if e.op == "symbol":
+                fixed[id(e)] = e.value in self._static or e.value.startswith("c:")
+            else:
+                fixed[id(e)] = all(fixed[id(a)] for a in e.args)
+
+        def visit(e: Expression, args: list[Expression]) -> Expression:
+            if fixed[id(e)]:
+                return e
+            ready = [self.slot(a) if fixed[id(a)] else b for a, b in zip(e.args, args, strict=True)]
+            return rebuild(e, ready)
+
+        done = fold(roots, visit)
+        return [self.slot(r) if fixed[id(r)] else d for r, d in zip(roots, done, strict=True)]
+
+    def slot(self, e: Expression) -> Expression:
+        """The coefficient that stands for a state-independent expression; a number stands for itself."""
+        if e.is_number or (e.op == "symbol" and e.value.startswith("c:")):
+            return e
+        (e,) = substitute([e], {f"c:{k}": v for k, v in enumerate(self.values)})
+        k = self._index.get(id(e))
+        if k is None:
+            k = self._index[id(e)] = len(self.values)
+            self.values.append(e)
+        return symbol(f"c:{k}")

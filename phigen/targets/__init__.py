@@ -1,0 +1,1 @@
+"""Targets: each prints a program in one language. See CONTRIBUTING for how to add one."""

@@ -1,0 +1,115 @@
+"""A program as C source: `NAME.h` and `NAME.c`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import jinja2
+
+from phigen import resources
+from phigen._version import __version__
+from phigen.scheme.program import Program
+from phigen.targets.c.kernels import function, member, wrapped_arguments
+from phigen.targets.header import CHECKSUM, checksum, header_lines, plain
+
+#: Backward differences kept for the starting guess of the inner solve.
+HISTORY = 8
+
+
+def emit(program: Program, command: str, *, single_file: bool = False) -> dict[str, str]:
+    """File names and their contents; with ``single_file`` only `NAME.c`, which then needs no header."""
+    name = program.name
+    declarations = _render("header.h", _values(program))
+    body = _body(program)
+    if single_file:
+        return {f"{name}.c": _sealed(program, command, declarations + "\n" + body)}
+    guard = f"{name.upper()}_H"
+    header = f"#ifndef {guard}\n#define {guard}\n\n{declarations}\n#endif /* {guard} */\n"
+    return {
+        f"{name}.h": _sealed(program, command, header),
+        f"{name}.c": _sealed(program, command, f'#include "{name}.h"\n\n{body}'),
+    }
+
+
+def _sealed(program: Program, command: str, body: str) -> str:
+    lines = header_lines(program, command)
+    comment = "\n".join(f" * {line}".rstrip() for line in lines)
+    return f"/*\n{comment}\n * {CHECKSUM} {checksum(body)}\n */\n{body}"
+
+
+def _render(template: str, values: Mapping[str, object]) -> str:
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(resources.templates() / "c"),
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+        autoescape=False,  # noqa: S701 - this is C, and all text of the user has passed `plain`
+    )
+    return environment.get_template(template + ".jinja").render(values)
+
+
+def _values(program: Program) -> dict[str, object]:
+    parameters = program.parameters
+    return {
+        "NAME": program.name,
+        "n": program.dimension,
+        "n2": program.dimension**2,
+        "order": program.order,
+        "casimir_count": len(program.casimirs),
+        "casimir_size": max(1, len(program.casimirs)),
+        "version": __version__,
+        "sha256": program.spec_sha256,
+        "coefficients": max(1, program.coefficients),
+        "history": HISTORY,
+        "coordinates": ", ".join(f"{c} = x[{i}]" for i, c in enumerate(program.coordinates)),
+        "casimirs": ", ".join(f"{c} = out[{i}]" for i, c in enumerate(program.casimirs)) or "none",
+        "members": [
+            (f"double {member(p.name)};", plain(p.description) or f"default {float(p.value)!r}") for p in parameters
+        ]
+        or [("char unused;", "this system has no parameters")],
+        "defaults": ", ".join(repr(float(p.value)) for p in parameters) or "0",
+        "max_iterations": program.max_iterations,
+        "tolerance": repr(program.tolerance),
+        **{f"{key}_signature": "\n".join(lines) for key, lines in _signatures(program).items()},
+        "pivoting": f"{program.name}_solve" + ("_pivoting" if "eliminate" in program.kernels else ""),
+    }
+
+
+def _signatures(program: Program) -> dict[str, list[str]]:
+    """Signatures that are too long for one line with a long name."""
+    name, n = program.name, program.dimension
+    solver, params, status = f"{name}_solver *s", f"const {name}_params *params", f"{name}_status "
+    increment = [f"const double increment[{n}]", f"const double increment_jacobian[{n * n}]"]
+    members = ["double *x", "size_t members", "double h", "size_t steps", "unsigned char *status"]
+    return {
+        "init": wrapped_arguments(f"{status}{name}_init(", [solver, params, f"const double x0[{n}]"]),
+        "ensemble": wrapped_arguments(f"{status}{name}_ensemble(", [params, *members]),
+        "hamiltonian": wrapped_arguments(f"double {name}_hamiltonian(", [params, f"const double x[{n}]"]),
+        "advance": wrapped_arguments(
+            f"static int {name}_advance(", [solver, *increment, f"const double delta[{n}]"]
+        ),
+    }
+
+
+def _body(program: Program) -> str:
+    values = _values(program)
+    kernels = program.kernels
+
+    def static(name: str) -> str:
+        return function(program, kernels[name]) + "\n"
+
+    def exported(name: str) -> str:
+        return function(program, kernels[name], exported=True) + "\n"
+
+    pieces = [_render("preamble.c", values), static("prepare")]
+    if program.driver == "explicit":
+        pieces += [static("explicit"), _render("explicit.c", values)]
+    else:
+        pieces += [static("linearise"), _render("pivoting.c", values)]
+        if "eliminate" in kernels:
+            pieces += [static("eliminate"), _render("unrolled.c", values)]
+        pieces += [_render("size_relative.c" if program.relative else "size.c", values)]
+        pieces += [_render("newton.c", values), _render("step.c", values)]
+    pieces += [_render("api.c", values), static("energy"), exported("casimirs"), exported("vector_field")]
+    return "\n".join([*pieces, _render("observables.c", values)])

@@ -1,0 +1,79 @@
+"""Trees over symbols as infix text: what C and Python have in common."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from fractions import Fraction
+
+from phigen.symbolic.expression import Expression, fold
+
+#: Binding strength: sums, products, atoms. Unary minus is printed in parentheses inside products.
+SUM, PRODUCT, ATOM = 1, 2, 3
+
+Printed = tuple[str, int]
+
+
+class Printer:
+    """Prints lowered trees (see `phigen.scheme.lowering`); a target gives names, literals and functions."""
+
+    def __init__(
+        self, name: Callable[[str], str], functions: dict[str, str], constants: dict[str, str], power: str
+    ) -> None:
+        self.name, self.functions, self.constants, self.power = name, functions, constants, power
+
+    def __call__(self, e: Expression) -> str:
+        """The tree as text."""
+        return fold([e], self._visit)[0][0]
+
+    def literal(self, value: Fraction) -> Printed:
+        """A rational number: exact where it is, else a quotient or the nearest double, shortest form."""
+        if value < 0:
+            return "-" + self.literal(-value)[0], SUM
+        if value.denominator == 1 and value < 2**53:
+            return f"{value.numerator}.0", ATOM
+        as_float = value.numerator / value.denominator
+        if Fraction(as_float) == value or value.denominator > 10**6 or value.numerator > 10**6:
+            return repr(as_float), ATOM
+        return f"{value.numerator}.0 / {value.denominator}.0", PRODUCT
+
+    def _visit(self, e: Expression, args: list[Printed]) -> Printed:
+        match e.op:
+            case "number":
+                return self.literal(e.value)
+            case "symbol":
+                return self.name(e.value), ATOM
+            case "add":
+                return f"{_in(args[0], SUM)} + {_in(args[1], PRODUCT)}", SUM
+            case "sub":
+                return f"{_in(args[0], SUM)} - {_in(args[1], PRODUCT)}", SUM
+            case "neg":
+                return f"-{_in(args[0], ATOM)}", SUM
+            case "mul":
+                for divisor, other in ((1, 0), (0, 1)):
+                    if e.args[divisor].op == "pow" and e.args[divisor].value == -1:
+                        return f"{_in(args[other], PRODUCT)} / {args[divisor][0].removeprefix('1.0 / ')}", PRODUCT
+                return f"{_in(args[0], PRODUCT)} * {_in(args[1], ATOM)}", PRODUCT
+            case "pow":
+                return self._power(e.value, args[0])
+            case "pi" | "E":
+                return self.constants[e.op], ATOM
+            case "sign":
+                return self.functions["sign"].format(args[0][0]), ATOM
+            case _:
+                return f"{self.functions[e.op]}({', '.join(a for a, _ in args)})", ATOM
+
+    def _power(self, exponent: Fraction, base: Printed) -> Printed:
+        if exponent == 2:
+            inner = _in(base, ATOM)
+            return f"{inner} * {inner}", PRODUCT
+        if exponent == -1:
+            return f"1.0 / {_in(base, ATOM)}", PRODUCT
+        if exponent == Fraction(1, 2):
+            return f"{self.functions['sqrt']}({base[0]})", ATOM
+        if exponent == Fraction(1, 3):
+            return f"{self.functions['cbrt']}({base[0]})", ATOM
+        return f"{self.power}({base[0]}, {self.literal(exponent)[0]})", ATOM
+
+
+def _in(part: Printed, level: int) -> str:
+    return part[0] if part[1] >= level else f"({part[0]})"
