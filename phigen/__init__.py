@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 _HOMES = {
     "load": "phigen.compiler",
     "compile": "phigen.compiler",
-    "System": "phigen.system",
+    "System": "phigen.geometry.system",
     "Solver": "phigen.runtime.solver",
     "Trajectory": "phigen.runtime.trajectory",
     "CheckError": "phigen.errors",
