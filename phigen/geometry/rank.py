@@ -1,0 +1,65 @@
+"""Generic rank: the rank of a matrix of expressions at exact rational points."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from fractions import Fraction
+from typing import Any
+
+from flint import fmpq, fmpq_mat
+
+from phigen.symbolic.expression import Expression, symbols_of
+from phigen.symbolic.numeric import DomainError, evaluate_exactly, evaluate_with_scale, is_rational
+from phigen.symbolic.verdict import DIGITS, ZERO_DIGITS, sample_point
+
+#: Points at which a rank is computed; the largest found counts.
+POINTS = 3
+ATTEMPTS = 64
+
+Rows = Sequence[Sequence[Expression]]
+
+
+def generic_ranks(matrices: Sequence[Rows], positive: Collection[str] = ()) -> list[int] | None:
+    """The rank of each matrix at generic points; None if no point of the domain was found.
+
+    The rank at a point never exceeds the generic one and equals it except at unlucky points, hence the
+    largest of `POINTS` points is taken. Entries that are no rational functions are evaluated to `DIGITS` digits.
+    """
+    roots = [e for m in matrices for row in m for e in row]
+    names, exact = symbols_of(*roots), is_rational(*roots)
+    found: list[list[int]] = []
+    for k in range(ATTEMPTS):
+        point = sample_point(names, positive, k)
+        try:
+            values = iter(evaluate_exactly(roots, point) if exact else evaluate_with_scale(roots, point, DIGITS))
+        except DomainError:
+            continue
+        rank = _exact_rank if exact else _numerical_rank
+        found.append([rank([[next(values) for _ in row] for row in m]) for m in matrices])
+        if len(found) == POINTS:
+            break
+    return [max(ranks) for ranks in zip(*found, strict=True)] if found else None
+
+
+def _exact_rank(rows: Sequence[Sequence[Fraction]]) -> int:
+    if not rows or not rows[0]:
+        return 0
+    return int(fmpq_mat([[fmpq(v.numerator, v.denominator) for v in row] for row in rows]).rank())
+
+
+def _numerical_rank(rows: Sequence[Sequence[tuple[Any, Any]]]) -> int:
+    """Rank of a matrix of (value, scale), by elimination with full pivoting; what is tiny against the scale is 0."""
+    left = [[value for value, _ in row] for row in rows]
+    threshold = max((scale for row in rows for _, scale in row), default=1) * 10**-ZERO_DIGITS
+    rank = 0
+    while left and left[0]:
+        size, r, c = max((abs(v), r, c) for r, row in enumerate(left) for c, v in enumerate(row))
+        if size <= threshold:
+            break
+        rank += 1
+        pivot = left.pop(r)
+        left = [
+            [v - row[c] / pivot[c] * w for k, (v, w) in enumerate(zip(row, pivot, strict=True)) if k != c]
+            for row in left
+        ]
+    return rank
