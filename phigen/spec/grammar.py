@@ -317,17 +317,14 @@ class _Parser:
         value = self.scope.lookup(token.text)
         if value is not None:
             return value
+        if token.text in SPEC_FUNCTIONS:
+            message = f"the function {token.text} needs an argument"
+            raise self.abandon(message, token.index, f"write {token.text}(…)")
         if token.text not in self.unknown:
             self.unknown.add(token.text)
-            if token.text in SPEC_FUNCTIONS and token.text not in self.scope.refused:
-                self.report(f"the function {token.text} needs an argument", token.index, f"{token.text}(…)")
-            else:
-                self.report(*self.named(token))
+            message, hint = self.scope.unknown(token.text)
+            self.report(message, token.index, hint)
         return symbol(f"unknown:{token.text}")
-
-    def named(self, token: Token) -> tuple[str, int, str]:
-        message, hint = self.scope.unknown(token.text)
-        return message, token.index, hint
 
     def call(self, token: Token) -> Expression:
         opening = self.here

@@ -19,7 +19,7 @@ from typing import Any
 from phigen.errors import Location
 from phigen.spec import limits
 from phigen.spec.names import planned
-from phigen.spec.problems import Problems, did_you_mean, one_of, shown
+from phigen.spec.problems import Problems, counted, did_you_mean, one_of, shown
 from phigen.spec.yaml_source import Mapping as MappingNode
 from phigen.spec.yaml_source import Node, Scalar, describe, is_unprintable, kind_of
 from phigen.spec.yaml_source import Sequence as SequenceNode
@@ -40,6 +40,12 @@ class Reader:
         self.problems.add(message, node.location, hint, limit=limit)
 
 
+def label(path: Path) -> str:
+    """``key: `` for the innermost key around a value, to begin a message with."""
+    keys = [part for part in path if isinstance(part, str)]
+    return f"{keys[-1]}: " if keys else ""
+
+
 class Kind:
     """A kind of value; ``expected`` names it in messages."""
 
@@ -55,8 +61,7 @@ class Kind:
 
     def mismatch(self, node: Node, path: Path, reader: Reader, hint: str = "") -> None:
         """Report a node of the wrong kind."""
-        what = f"{path[-1]}: " if path and isinstance(path[-1], str) else ""
-        reader.error(node, f"{what}expected {self.expected}, found {kind_of(node)}", hint)
+        reader.error(node, f"{label(path)}expected {self.expected}, found {kind_of(node)}", hint)
 
 
 @dataclass(frozen=True)
@@ -77,7 +82,7 @@ class Text(Kind):
         text = node.text.strip("\n") if self.lines else node.text.strip()
         bad = [c for c in text if is_unprintable(c) and c not in ("\n\t" if self.lines else "")]
         if bad == ["\n"] * len(bad) and bad:
-            return reader.error(node, f"{path[-1]}: expected one line of text, found {len(bad) + 1} lines")
+            return reader.error(node, f"{label(path)}expected one line of text, found {len(bad) + 1} lines")
         if bad:
             return reader.error(node, f"the text contains the character {describe(bad[0])}")
         return text
@@ -134,10 +139,9 @@ class Choice(Kind):
         if node.text in self.words:
             return node.text
         if node.text in self.planned:
-            return reader.error(node, planned(f"{path[-1]}: {node.text}"), self.expected)
-        what = f"{path[-1]}: " if isinstance(path[-1], str) else ""
+            return reader.error(node, planned(f"{label(path)}{node.text}"), self.expected)
         hint = did_you_mean(node.text, self.words + self.planned) or self.expected
-        return reader.error(node, f"{what}{shown(node.text)} is not known", hint)
+        return reader.error(node, f"{label(path)}{shown(node.text)} is not known", hint)
 
     def schema(self) -> Schema:
         return {"enum": list(self.words)}
@@ -163,9 +167,9 @@ class Integer(Kind):
             return self.mismatch(node, path, reader)
         if self.least <= value <= self.most:
             return int(value)
-        message = f"{path[-1]}: {node.text[:60]} is not between {self.least} and {self.most}"
+        message = f"{label(path)}{node.text[:60]} is not between {self.least} and {self.most}"
         if self.least == self.most:
-            message = f"{path[-1]}: {node.text[:60]} is not known; this version of phigen reads {self.least}"
+            message = f"{label(path)}{node.text[:60]} is not known; this version of phigen reads {self.least}"
         return reader.error(node, message, limit=self.limit and value > self.most)
 
     def schema(self) -> Schema:
@@ -222,9 +226,10 @@ class ListOf(Kind):
         if not isinstance(node, SequenceNode):
             return self.mismatch(node, path, reader, "lists are written [a, b]" if isinstance(node, Scalar) else "")
         if len(node.items) < self.least:
-            return reader.error(node, f"{path[-1]}: expected at least {self.least} entries, found {len(node.items)}")
+            least = counted(self.least, "entry", "entries")
+            return reader.error(node, f"{label(path)}expected at least {least}, found {len(node.items)}")
         if len(node.items) > self.most:
-            return reader.error(node, f"{path[-1]}: {len(node.items)} entries, the limit is {self.most}", limit=True)
+            return reader.error(node, f"{label(path)}{len(node.items)} entries, the limit is {self.most}", limit=True)
         values = []
         for index, item in enumerate(node.items):
             reader.locations[*path, index] = item.location
@@ -249,9 +254,9 @@ class MapOf(Kind):
             hint = "remove the key, or write {} for none" if isinstance(node, Scalar) and node.is_null else ""
             return self.mismatch(node, path, reader, hint)
         if len(node.entries) < self.least:
-            return reader.error(node, f"{path[-1]}: expected at least {self.least} entry, found none")
+            return reader.error(node, f"{label(path)}expected at least {self.least} entry, found none")
         if len(node.entries) > limits.ENTRIES:
-            message = f"{path[-1]}: {len(node.entries)} entries, the limit is {limits.ENTRIES}"
+            message = f"{label(path)}{len(node.entries)} entries, the limit is {limits.ENTRIES}"
             return reader.error(node, message, limit=True)
         values = {}
         for name, (key, item) in node.entries.items():
@@ -332,8 +337,8 @@ class Record(Kind):
         for name in given[1:]:
             message = f"{self.what}: {given[0]} and {name} exclude each other"
             reader.error(node.entries[name][0], message, "give one of them")
-        known_to_be_planned = any(name in self.planned for name in node.entries)
-        if self.exactly and not given and not known_to_be_planned:
+        strange = set(node.entries) - {f.key for f in self.fields}  # reported already
+        if self.exactly and not given and not strange:
             reader.error(node, f"{self.what}: one of {', '.join(self.one)} is needed")
 
     def schema(self) -> Schema:

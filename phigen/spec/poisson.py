@@ -22,7 +22,7 @@ from phigen.spec.model import (
     PoissonForm,
 )
 from phigen.spec.names import FAMILIES, FAMILY_HELP, FAMILY_NAME, MEMBERS
-from phigen.spec.problems import did_you_mean, shown
+from phigen.spec.problems import counted, did_you_mean, shown
 from phigen.spec.yaml_source import Scalar
 from phigen.symbolic.expression import ZERO, Expression, neg
 
@@ -48,11 +48,11 @@ def _entries(
     what, before = ".".join(str(p) for p in path if isinstance(p, str)), len(declared.reader.problems.found)
     if len(rows) != size:
         hint = "one for each coordinate" if size == len(declared.coordinates) else "the matrix is square"
-        _fail(declared, path, f"{what}: expected {size} rows, found {len(rows)}", hint)
+        _fail(declared, path, f"{what}: expected {counted(size, 'row')}, found {len(rows)}", hint)
     matrix = []
     for i, row in enumerate(rows):
         if row is not None and len(row) != size:
-            _fail(declared, (*path, i), f"{what}: row {i + 1} has {len(row)} entries, not {size}")
+            _fail(declared, (*path, i), f"{what}: row {i + 1} has {counted(len(row), 'entry', 'entries')}, not {size}")
         matrix.append(tuple(declared.formula(cell, scope) or ZERO for cell in row or ()))
     return tuple(matrix) if len(declared.reader.problems.found) == before else None
 
@@ -147,15 +147,20 @@ def _family(node: Scalar, sign: int, declared: Declarations) -> PoissonForm | No
         return declared.reader.error(node, f"the Lie algebra {node.text} is not available", f"names are {FAMILY_HELP}")
     size = len(declared.coordinates)
     if dimension(n) != size and not declared.incomplete:
-        count = "1 coordinate" if size == 1 else f"{size} coordinates"
-        return declared.reader.error(node, f"{node.text} has dimension {dimension(n)}, but there are {count}")
+        message = f"{node.text} has dimension {dimension(n)}, but there are {counted(size, 'coordinate')}"
+        return declared.reader.error(node, message)
     return LieAlgebraForm(sign=sign, family=family, size=n)
 
 
 def _spanned(given: list[Rows | None], sign: int, declared: Declarations) -> PoissonForm | None:
     path, n = ("lie_algebra", "matrices"), _dimension(declared, len(given))
     if len(given) != n:
-        _fail(declared, path, f"lie_algebra: {len(given)} matrices for {n} coordinates", "one for each coordinate")
+        _fail(
+            declared,
+            path,
+            f"lie_algebra: {counted(len(given), 'matrix', 'matrices')} for {counted(n, 'coordinate')}",
+            "one for each coordinate",
+        )
     scope = declared.constants("a matrix of a Lie algebra")
     size = len(given[0] or ())
     matrices = [_entries(m, (*path, i), declared, scope, size) if m is not None else None for i, m in enumerate(given)]

@@ -31,6 +31,11 @@ def one_of(choices: Iterable[str]) -> str:
     return "one of " + ", ".join(choices)
 
 
+def counted(number: int, noun: str, plural: str = "") -> str:
+    """``1 row``, ``2 rows``."""
+    return f"{number} {noun if number == 1 else plural or noun + 's'}"
+
+
 class Problems:
     """The diagnostics of one file; `finish` raises them, in the order of the file."""
 
@@ -55,7 +60,7 @@ class Problems:
 
     def error(self) -> SpecError:
         """The exception that holds what was found; a `LimitError` if a limit is among it."""
-        ordered = [self.found[key] for key in sorted(self.found)]
+        ordered = [self.found[key] for key in sorted(self.found, key=lambda key: key[0])]
         if len(ordered) >= limits.ERRORS:
             ordered.append(Diagnostic(f"there may be more: only {limits.ERRORS} errors are listed"))
         return (LimitError if self.limit else SpecError)(ordered)

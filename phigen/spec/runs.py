@@ -10,7 +10,7 @@ from phigen.spec import limits
 from phigen.spec.declarations import Declarations
 from phigen.spec.grammar import Scope
 from phigen.spec.model import Run
-from phigen.spec.problems import did_you_mean, shown
+from phigen.spec.problems import counted, did_you_mean, shown
 from phigen.spec.yaml_source import Scalar
 from phigen.symbolic.expression import Expression, symbol
 
@@ -84,8 +84,7 @@ def _initial(name: str, given: Any, declared: Declarations) -> tuple[Fraction, .
     if given is None:
         return ()
     if len(given) != n and not declared.incomplete:
-        count = "1 coordinate" if n == 1 else f"{n} coordinates"
-        _fail(name, "initial", f"initial: {len(given)} values for {count}", declared)
+        _fail(name, "initial", f"initial: {counted(len(given), 'value')} for {counted(n, 'coordinate')}", declared)
     return tuple(declared.number(node, scope) or Fraction(0) for node in given)
 
 

@@ -13,7 +13,7 @@ from phigen.spec.kinds import Reader
 from phigen.spec.model import BirealisationChoice, MatrixForm, SolverOptions, Spec
 from phigen.spec.names import KEYWORDS, LICENSE_REFERENCE, LICENSES, TAKEN
 from phigen.spec.poisson import poisson_form
-from phigen.spec.problems import Problems, did_you_mean, shown
+from phigen.spec.problems import Problems, counted, did_you_mean, shown
 from phigen.spec.runs import run, without_repetition
 from phigen.spec.yaml_source import Scalar, decode, read
 from phigen.symbolic.expression import ZERO, Expression, symbol
@@ -117,7 +117,7 @@ def _custom(options: Mapping[str, Any], declared: Declarations) -> Birealisation
     for key in ("alpha", "beta"):
         nodes = options.get(key, ())
         if len(nodes) != n and key in options and not declared.incomplete:
-            message = f"birealisation: {key} has {len(nodes)} expressions for {n} coordinates"
+            message = f"birealisation: {key} has {counted(len(nodes), 'expression')} for {counted(n, 'coordinate')}"
             declared.reader.problems.add(message, declared.reader.locations["birealisation", key])
         halves[key] = tuple(declared.formula(node, scope) or ZERO for node in nodes)
     return BirealisationChoice(kind="custom", alpha=halves["alpha"], beta=halves["beta"])

@@ -143,7 +143,7 @@ def decode(data: bytes, file: str) -> str:
                 and is_unprintable(character)
             ):
                 message = f"the character {describe(character)} is not allowed in a spec"
-                problems.add(message, _location(text, index, file), "delete it, or write it as an escape")
+                problems.add(message, _location(text, index, file), "delete it")
     problems.finish()
     return text
 
@@ -192,6 +192,8 @@ class _Builder:
 
     def syntax_error(self, error: Any) -> Exception:
         mark = error.problem_mark or error.context_mark
+        if error.context_mark and mark.index >= len(self.text):  # rather where it opens than the end of the file
+            mark = error.context_mark
         location = self.place(mark) if mark else Location(1, 1, self.problems.file)
         what = " ".join(part for part in (error.context, error.problem) if part)
         hint = "put expressions and texts with special characters between quotes"
@@ -262,6 +264,8 @@ class _Builder:
             pending[0] = node
         else:
             key, pending[0] = pending[0], None
+            if isinstance(node, Scalar) and node.is_null and not node.text:
+                node.location = key.location  # ruamel places nothing before what follows it
             first = parent.entries.get(key.text)
             if first is None:
                 parent.entries[key.text] = (key, node)
