@@ -1,12 +1,28 @@
-"""Casimir functions that the form of a Poisson tensor gives."""
+"""Casimir functions that the form of a Poisson tensor gives.
+
+Sources, in this order: the Casimirs of a Nambu bracket; the kernel of a constant π (linear functions); the
+kernel of A for a log-canonical π (monomials x^u); polynomials of growing degree, by linear algebra; traces of
+powers tr X^m on the dual of a matrix algebra with a non-degenerate trace form. Functions that depend on
+declared or earlier ones are dropped. Nothing here is trusted: `phigen.geometry.checks` proves each.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from fractions import Fraction
 
-from phigen.geometry.shapes import Matrix, Shape
-from phigen.spec.model import PoissonForm
-from phigen.symbolic.expression import Expression
+from phigen.geometry.field import Field, Scalar
+from phigen.geometry.linear import coprime_integers, kernel
+from phigen.geometry.polynomial_casimirs import polynomial_casimirs
+from phigen.geometry.rank import generic_ranks
+from phigen.geometry.representations import known_representation
+from phigen.geometry.shapes import Canonical, Constant, LiePoisson, LogCanonical, Matrix, Shape
+from phigen.geometry.trace_casimirs import trace_casimirs
+from phigen.spec.model import NambuForm, PoissonForm
+from phigen.symbolic.expression import Expression, call, gradient, number, power, product, symbol, total
+
+#: Largest degree of the polynomials that are searched for.
+DEGREE = 4
 
 
 def found_casimirs(
@@ -17,5 +33,79 @@ def found_casimirs(
     declared: Mapping[str, Expression],
     taken: Collection[str],
 ) -> tuple[dict[str, Expression], tuple[str, ...]]:
-    """Stub."""
-    return {}, ()
+    """Casimirs independent of the declared ones, under names C1, C2, … that are not taken; and notes.
+
+    The search ends when as many are known as the corank of π allows. Notes say what was left out.
+    """
+    slopes = [gradient(c, coordinates) for c in declared.values()]
+    ranks = generic_ranks([poisson, slopes])
+    if ranks is None:
+        return {}, ("no Casimirs were searched for: no point of the domain of π was found",)
+    rank, known = ranks
+    missing = len(coordinates) - rank - known
+    found: list[Expression] = []
+    notes: list[str] = []
+    if missing > 0:
+        for candidate in _candidates(coordinates, poisson, shape, form, notes):
+            slope = gradient(candidate, coordinates)
+            ranks = generic_ranks([[*slopes, slope]])
+            if ranks is None or ranks[0] <= known:
+                continue
+            slopes, known = [*slopes, slope], ranks[0]
+            found.append(candidate)
+            if len(found) == missing:
+                notes = []
+                break
+    names = (f"C{i}" for i in range(1, len(found) + len(taken) + 1) if f"C{i}" not in taken)
+    return dict(zip(names, found, strict=False)), tuple(notes)
+
+
+def _candidates(
+    coordinates: Sequence[str], poisson: Matrix, shape: Shape, form: PoissonForm, notes: list[str]
+) -> Iterator[Expression]:
+    if isinstance(form, NambuForm):
+        yield from form.casimirs
+        return
+    match shape:
+        case Constant(matrix) | Canonical(matrix=matrix):
+            yield from _linear(coordinates, matrix)
+            return
+        case LogCanonical(a):
+            yield from _monomial(coordinates, a)
+            return
+        case LiePoisson(algebra):
+            # Degree 3 finds the sparse ones of low degree; the traces are dense but reach every degree.
+            yield from polynomial_casimirs(coordinates, poisson, 3, [])
+            representation = known_representation(algebra)
+            if representation is not None:
+                yield from trace_casimirs(coordinates, representation)
+    yield from polynomial_casimirs(coordinates, poisson, DEGREE, notes)
+
+
+def _linear(coordinates: Sequence[str], matrix: Matrix) -> Iterator[Expression]:
+    field, vectors = _kernel(matrix)
+    for vector in vectors:
+        scaled = coprime_integers(vector) if field.is_rational else vector
+        yield total(
+            (number(v) if isinstance(v, int) else field.expression(v)) * symbol(coordinates[i])
+            for i, v in sorted(scaled.items())
+        )
+
+
+def _monomial(coordinates: Sequence[str], a: Matrix) -> Iterator[Expression]:
+    """x^u for the kernel vectors u of A; ½ Σ u_i log x_i² where the exponents contain parameters."""
+    field, vectors = _kernel(a)
+    for vector in vectors:
+        if field.is_rational:
+            yield product(power(symbol(coordinates[i]), u) for i, u in sorted(coprime_integers(vector).items()))
+        else:
+            logarithms = (
+                field.expression(u) * call("log", power(symbol(coordinates[i]), 2)) for i, u in sorted(vector.items())
+            )
+            yield number(Fraction(1, 2)) * total(logarithms)
+
+
+def _kernel(matrix: Matrix) -> tuple[Field, list[dict[int, Scalar]]]:
+    field = Field(e for row in matrix for e in row)
+    rows = [{j: field.convert(e) for j, e in enumerate(row) if not e.is_zero} for row in matrix]
+    return field, kernel(field, rows, len(matrix))

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from math import gcd, lcm
 from typing import Any, Generic, TypeVar
 
 from phigen.geometry.field import Field, Scalar
+from phigen.symbolic.tower import rational
 
 Key = TypeVar("Key", bound=Any)
 
@@ -82,26 +84,39 @@ def add_multiple(target: dict[Key, Scalar], source: Mapping[Key, Scalar], factor
 
 
 def kernel(field: Field, rows: Sequence[Mapping[int, Scalar]], size: int) -> list[dict[int, Scalar]]:
-    """A basis of the vectors v of length ``size`` with Σ_k row[k]·v[k] = 0 for all rows, in reduced form."""
-    reduced: list[tuple[int, dict[int, Scalar]]] = []
-    for row in rows:
+    """A basis of the vectors v of length ``size`` with Σ_k row[k]·v[k] = 0 for all rows, in reduced form.
+
+    Each vector is 1 at its last non-zero position, where the others are 0.
+    """
+    echelon: dict[int, dict[int, Scalar]] = {}
+    for row in sorted(rows, key=len):
         rest = {k: v for k, v in row.items() if v != 0}
-        for pivot, known in reduced:
-            if pivot in rest:
-                add_multiple(rest, known, -rest[pivot])
-        if not rest:
-            continue
-        pivot = min(rest)
-        scale = field.one / rest[pivot]
-        rest = {k: v * scale for k, v in rest.items()}
-        for _, known in reduced:
-            if pivot in known:
-                add_multiple(known, rest, -known[pivot])
-        reduced.append((pivot, rest))
-    pivots = {pivot for pivot, _ in reduced}
-    basis = []
-    for free in range(size):
-        if free not in pivots:
-            vector = {pivot: -row[free] for pivot, row in reduced if free in row}
-            basis.append(vector | {free: field.one})
-    return basis
+        while rest:
+            pivot = min(rest)
+            known = echelon.get(pivot)
+            if known is None:
+                scale = field.one / rest[pivot]
+                echelon[pivot] = {k: v * scale for k, v in rest.items()}
+                break
+            add_multiple(rest, known, -rest[pivot])
+        if len(echelon) == size:
+            return []
+    for pivot in sorted(echelon, reverse=True):
+        row = echelon[pivot]
+        for k in sorted(k for k in row if k > pivot and k in echelon):
+            add_multiple(row, echelon[k], -row[k])
+    return [
+        {pivot: -row[free] for pivot, row in sorted(echelon.items()) if free in row} | {free: field.one}
+        for free in range(size)
+        if free not in echelon
+    ]
+
+
+def coprime_integers(vector: Mapping[Any, Scalar]) -> dict[Any, int]:
+    """The multiple of a vector over Q that has coprime integers, the first of them (in order of keys) positive."""
+    exact = {k: rational(v) for k, v in sorted(vector.items())}
+    scale = lcm(*(v.denominator for v in exact.values()))
+    integers = {k: int(v * scale) for k, v in exact.items()}
+    common = gcd(*integers.values())
+    sign = 1 if next(iter(integers.values())) > 0 else -1
+    return {k: sign * v // common for k, v in integers.items()}

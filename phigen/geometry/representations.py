@@ -22,6 +22,11 @@ Sparse = dict[tuple[int, int], Scalar]
 _LARGEST_MATCHED = 45
 
 
+def known_representation(algebra: LieAlgebra) -> Representation | None:
+    """The representation that came with the algebra, or that of a named family with the same constants."""
+    return algebra.representation or next(_matching_families(algebra), None)
+
+
 def candidates(algebra: LieAlgebra) -> Iterator[Representation]:
     """Faithful representations, the preferred ones first; not the one that came with the algebra."""
     yield from _matching_families(algebra)

@@ -1,0 +1,83 @@
+"""Polynomial Casimirs of a polynomial π, by exact linear algebra on their coefficients."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import combinations_with_replacement
+from math import comb
+
+from phigen.geometry.field import Field, Scalar
+from phigen.geometry.linear import coprime_integers, kernel
+from phigen.geometry.shapes import Matrix, Terms, coordinate_terms
+from phigen.symbolic.expression import Expression, number, symbol
+from phigen.symbolic.horner import horner
+
+#: Most unknown coefficients of one linear system, without and with parameters in π.
+UNKNOWNS, UNKNOWNS_WITH_PARAMETERS = 800, 60
+
+Exponents = tuple[int, ...]
+
+
+def polynomial_casimirs(
+    coordinates: Sequence[str], poisson: Matrix, degree: int, notes: list[str]
+) -> Iterator[Expression]:
+    """A basis of the polynomial Casimirs of degree 1, then 2, … up to ``degree``, constants left out.
+
+    For a π whose terms have one common degree, those of degree d are homogeneous; otherwise they include the
+    ones of lower degree. Degrees whose linear system is too large are skipped, and ``notes`` says so.
+    """
+    n = len(coordinates)
+    listed = coordinate_terms(coordinates, [e for row in poisson for e in row])
+    if listed is None:
+        notes.append("polynomial Casimirs were not searched for: π is not polynomial in the coordinates")
+        return
+    field = Field(c for terms in listed for c in terms.values())
+    # Columns of π: the equations are Σ_j π_ij ∂_j C = 0, one for each row i.
+    entries = [[_converted(field, listed[i * n + j]) for j in range(n)] for i in range(n)]
+    homogeneous = len({sum(e) for terms in listed for e in terms}) <= 1
+    largest = UNKNOWNS if field.is_rational else UNKNOWNS_WITH_PARAMETERS
+    variables = [symbol(c) for c in coordinates]
+    for d in range(1, degree + 1):
+        size = comb(n + d - 1, d) if homogeneous else comb(n + d, d) - 1
+        if size > largest:
+            notes.append(f"polynomial Casimirs of degree {d} and more were not searched for: {size} unknowns")
+            return
+        monomials = [m for k in range(d if homogeneous else 1, d + 1) for m in _monomials(n, k)]
+        for vector in kernel(field, _equations(entries, monomials), len(monomials)):
+            if field.is_rational:
+                terms = {monomials[i]: number(c) for i, c in coprime_integers(vector).items()}
+            else:
+                terms = {monomials[i]: field.expression(c) for i, c in vector.items()}
+            yield horner(terms, variables)
+
+
+def _converted(field: Field, terms: Terms) -> dict[Exponents, Scalar]:
+    return {e: field.convert(c) for e, c in terms.items()}
+
+
+def _monomials(n: int, degree: int) -> list[Exponents]:
+    found = []
+    for chosen in combinations_with_replacement(range(n), degree):
+        exponents = [0] * n
+        for i in chosen:
+            exponents[i] += 1
+        found.append(tuple(exponents))
+    return found
+
+
+def _equations(entries: list[list[dict[Exponents, Scalar]]], monomials: list[Exponents]) -> list[dict[int, Scalar]]:
+    """One sparse row for each row of π and each monomial that occurs in it."""
+    rows: dict[tuple[int, Exponents], dict[int, Scalar]] = {}
+    for column, monomial in enumerate(monomials):
+        for j, exponent in enumerate(monomial):
+            if not exponent:
+                continue
+            slope = (*monomial[:j], exponent - 1, *monomial[j + 1 :])
+            for i, row in enumerate(entries):
+                for e, c in row[j].items():
+                    target = rows.setdefault((i, tuple(map(int.__add__, slope, e))), {})
+                    value = c
+                    for _ in range(exponent - 1):
+                        value = value + c
+                    target[column] = target[column] + value if column in target else value
+    return [rows[key] for key in sorted(rows)]

@@ -1,0 +1,75 @@
+"""Casimirs tr X^m on the dual of a matrix algebra with a non-degenerate trace form."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from phigen.geometry.field import Field, Scalar
+from phigen.geometry.lie_algebra import Representation
+from phigen.geometry.linear import Span, coprime_integers
+from phigen.symbolic.expression import Expression
+from phigen.symbolic.tower import Poly, Tower
+
+#: Powers are expanded; beyond this size of matrix they are not worth it.
+_LARGEST = 8
+_MOST_TERMS = 300
+
+
+def trace_casimirs(coordinates: Sequence[str], representation: Representation) -> Iterator[Expression]:
+    """tr X^m for m = 1, 2, …, size, where X = Σ x_i E^i and E^i is dual to E_i under tr(E_i E_j).
+
+    They generate the coefficients of the characteristic polynomial of X. Nothing if the trace form is
+    degenerate, a matrix contains parameters, or the matrices are large; what has too many terms is left out.
+    """
+    if representation.size > _LARGEST:
+        return
+    field = Field(v for m in representation.matrices for v in m.values())
+    if not field.is_rational:
+        return
+    matrices = [{at: field.convert(v) for at, v in m.items()} for m in representation.matrices]
+    form = [{j: t for j, b in enumerate(matrices) if (t := _trace(field, a, b)) != 0} for a in matrices]
+    span = Span(field, form)
+    if span.dependent:
+        return
+    tower = Tower(coordinates)
+    element = _dual_element(tower, field, coordinates, matrices, span, representation.size)
+    power = element
+    for m in range(1, representation.size + 1):
+        trace = tower.combine(power[i][i] for i in range(representation.size))
+        if len(trace) > _MOST_TERMS:
+            return
+        if trace != 0:
+            integers = coprime_integers(dict(enumerate(trace.coeffs())))
+            yield tower.expression(trace * (integers[0] / trace.leading_coefficient()))
+        if m < representation.size:
+            power = _times(tower, power, element)
+
+
+def _trace(field: Field, a: dict[tuple[int, int], Scalar], b: dict[tuple[int, int], Scalar]) -> Scalar:
+    result = field.zero
+    for (r, c), v in a.items():
+        if (c, r) in b:
+            result = result + v * b[c, r]
+    return result
+
+
+def _dual_element(
+    tower: Tower,
+    field: Field,
+    coordinates: Sequence[str],
+    matrices: Sequence[dict[tuple[int, int], Scalar]],
+    span: Span[int],
+    size: int,
+) -> list[list[Poly]]:
+    rows = [[tower.zero for _ in range(size)] for _ in range(size)]
+    for i, name in enumerate(coordinates):
+        # The form is symmetric: coordinates of the i-th unit vector in its rows are a row of its inverse.
+        for j, c in (span.coordinates({i: field.one}) or {}).items():
+            for (r, column), v in matrices[j].items():
+                rows[r][column] = rows[r][column] + tower.variable(name) * (c * v)
+    return rows
+
+
+def _times(tower: Tower, a: list[list[Poly]], b: list[list[Poly]]) -> list[list[Poly]]:
+    n = range(len(a))
+    return [[tower.combine(a[i][k] * b[k][j] for k in n if a[i][k] != 0 and b[k][j] != 0) for j in n] for i in n]
