@@ -132,5 +132,3 @@ class Field:
 
 def _integer_power(node: Expression) -> bool:
     return node.op == "pow" and node.value.denominator == 1
-
-

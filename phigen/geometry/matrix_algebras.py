@@ -39,8 +39,8 @@ def algebra_of_sparse_matrices(
     converted = [{at: field.convert(e) for at, e in m.items()} for m in matrices]
     span = Span(field, converted)
     if span.dependent:
-        which = span.dependent[0]
-        raise SpecError([Diagnostic(f"lie_algebra matrices: E{which + 1} is a linear combination of the others before it")])
+        which = span.dependent[0] + 1
+        raise SpecError([Diagnostic(f"lie_algebra matrices: E{which} is a linear combination of those before it")])
     constants = {}
     for i, j in combinations(range(len(matrices)), 2):
         commutator = product(converted[i], converted[j])
@@ -73,9 +73,7 @@ def product(a: SparseMatrix, b: SparseMatrix) -> SparseMatrix:
     return out
 
 
-def from_structure_constants(
-    dimension: int, given: Mapping[int, Mapping[int, Mapping[int, Expression]]]
-) -> LieAlgebra:
+def from_structure_constants(dimension: int, given: Mapping[int, Mapping[int, Mapping[int, Expression]]]) -> LieAlgebra:
     """The algebra with [E_i, E_j] = Σ_k given[i][j][k] E_k (from 0); pairs may be given in one order or both.
 
     Raises `SpecError` for indices out of range, pairs that contradict antisymmetry, and a failing Jacobi
@@ -83,7 +81,8 @@ def from_structure_constants(
     """
     used = [i for i, row in given.items() for j, ks in row.items() for i in (i, j, *ks)]
     if used and max(used) >= dimension:
-        raise SpecError([Diagnostic(f"structure constants use E{max(used) + 1}, but there are {dimension} coordinates")])
+        message = f"structure constants use E{max(used) + 1}, but there are {dimension} coordinates"
+        raise SpecError([Diagnostic(message)])
     constants: dict[tuple[int, int], dict[int, Expression]] = {}
     for i in range(dimension):
         for j in range(i, dimension):
@@ -102,14 +101,11 @@ def _bracket_of_pair(
     if i == j:
         backward = None if forward is None else dict.fromkeys(forward, ZERO)
     if forward is not None and backward is not None:
-        residuals = [
-            (f"E{k + 1}", forward.get(k, ZERO) + backward.get(k, ZERO)) for k in sorted({*forward, *backward})
-        ]
+        residuals = [(f"E{k + 1}", forward.get(k, ZERO) + backward.get(k, ZERO)) for k in sorted({*forward, *backward})]
         statement = decide_zero("antisymmetry", residuals)
         if statement.verdict == REFUTED:
-            pair = f"[E{i + 1}, E{j + 1}]"
-            message = f"structure constants: {pair} = 0" if i == j else f"structure constants: {pair} = −[E{j + 1}, E{i + 1}]"
-            raise SpecError([Diagnostic(f"{message} does not hold in the component {statement.detail}")])
+            claim = f"[E{i + 1}, E{j + 1}] = " + ("0" if i == j else f"−[E{j + 1}, E{i + 1}]")
+            raise SpecError([Diagnostic(f"structure constants: {claim} does not hold, component {statement.detail}")])
     if i == j:
         return {}
     row = forward if forward is not None else {k: -c for k, c in (backward or {}).items()}

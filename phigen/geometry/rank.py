@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from fractions import Fraction
 from typing import Any
 
@@ -30,12 +30,14 @@ def generic_ranks(matrices: Sequence[Rows], positive: Collection[str] = ()) -> l
     found: list[list[int]] = []
     for k in range(ATTEMPTS):
         point = sample_point(names, positive, k)
+        values: list[Any]
         try:
-            values = iter(evaluate_exactly(roots, point) if exact else evaluate_with_scale(roots, point, DIGITS))
+            values = evaluate_exactly(roots, point) if exact else evaluate_with_scale(roots, point, DIGITS)
         except DomainError:
             continue
-        rank = _exact_rank if exact else _numerical_rank
-        found.append([rank([[next(values) for _ in row] for row in m]) for m in matrices])
+        rank: Callable[[Any], int] = _exact_rank if exact else _numerical_rank
+        in_turn = iter(values)
+        found.append([rank([[next(in_turn) for _ in row] for row in m]) for m in matrices])
         if len(found) == POINTS:
             break
     return [max(ranks) for ranks in zip(*found, strict=True)] if found else None

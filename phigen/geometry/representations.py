@@ -150,6 +150,4 @@ def _is_two_step(algebra: LieAlgebra, adjoint: list[Sparse], field: Field) -> bo
 
 
 def _named(name: str, size: int, matrices: Sequence[Sparse], field: Field) -> Representation:
-    return Representation(
-        name, size, tuple({at: field.expression(v) for at, v in sorted(m.items())} for m in matrices)
-    )
+    return Representation(name, size, tuple({at: field.expression(v) for at, v in sorted(m.items())} for m in matrices))

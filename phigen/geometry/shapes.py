@@ -155,6 +155,7 @@ def _lie_poisson(coordinates: Sequence[str], entries: dict[tuple[int, int], Term
 
 def skew(upper: dict[tuple[int, int], Expression], n: int) -> Matrix:
     """The skew n×n matrix with the given entries above the diagonal."""
+
     def entry(i: int, j: int) -> Expression:
         return upper.get((i, j), ZERO) if i < j else -upper.get((j, i), ZERO)
 

@@ -80,9 +80,9 @@ class System:
         maps symbols (or names) to default values; a symbol declared positive makes a positive parameter.
         Raises `SpecError` for a matrix of the wrong size, unknown symbols and functions.
         """
-        from phigen.geometry import sympy_bridge
+        from phigen.geometry.sympy_bridge import system as build
 
-        return sympy_bridge.system(coordinates, poisson, hamiltonian, parameters, casimirs, invariants, name)
+        return build(coordinates, poisson, hamiltonian, parameters, casimirs, invariants, name)
 
 
 def system_from_spec(spec: Spec) -> System:
@@ -154,8 +154,5 @@ def _located(error: SpecError, locations: Mapping[tuple[Any, ...], Location]) ->
     """The error with the place of the spec's ``poisson`` part where it has none."""
     place = locations.get(("poisson",))
     return SpecError(
-        [
-            Diagnostic(d.message, d.location or place, d.hint, d.source_line, d.severity)
-            for d in error.diagnostics
-        ]
+        [Diagnostic(d.message, d.location or place, d.hint, d.source_line, d.severity) for d in error.diagnostics]
     )

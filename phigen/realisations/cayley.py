@@ -88,14 +88,14 @@ def closed_product(algebra: LieAlgebra) -> tuple[Trilinear, str]:
             return found, f"with {algebra.representation.name}"
         tried[algebra.representation.name] = _refusal(algebra, algebra.representation, found)
     terms: Trilinear = {}
-    used: list[str] = []
+    used: dict[str, list[str]] = {}
     for part in indecomposable_parts(algebra):
         ideal = restricted(algebra, part)
         for representation in candidates(ideal):
             found = _product(ideal, representation)
             if not isinstance(found, _Escape):
                 terms |= {(part[i], part[a], part[b], part[k]): c for (i, a, b, k), c in found.items()}
-                used.append(representation.name + _whose(ideal, algebra))
+                used.setdefault(representation.name, []).append(f"({', '.join(ideal.labels)})")
                 break
             tried[representation.name] = _refusal(ideal, representation, found)
         else:
@@ -105,11 +105,9 @@ def closed_product(algebra: LieAlgebra) -> tuple[Trilinear, str]:
                 "the kinds exponential and karasev, which need no representation, are planned; "
                 "a closed faithful representation can be given as lie_algebra: {matrices: […]}",
             )
-    return terms, "with " + "; ".join(used)
-
-
-def _whose(ideal: LieAlgebra, algebra: LieAlgebra) -> str:
-    return f" for {', '.join(ideal.labels)}" if ideal.dimension < algebra.dimension else ""
+    if len(used) == 1 and max(map(len, used.values())) == 1:
+        return terms, f"with {next(iter(used))}"
+    return terms, "with " + "; ".join(f"{name} for {', '.join(parts)}" for name, parts in used.items())
 
 
 def _refusal(algebra: LieAlgebra, representation: Representation, escape: _Escape) -> str:

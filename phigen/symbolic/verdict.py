@@ -150,5 +150,3 @@ def shortened(expression: Expression) -> str:
 def all_hold(statements: Iterable[Statement]) -> bool:
     """Whether no statement was refuted or left undecided."""
     return all(s.holds for s in statements)
-
-
