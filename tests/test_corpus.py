@@ -1,0 +1,28 @@
+import json
+from pathlib import Path
+
+import pytest
+
+from phigen import resources, spec
+
+SPECS = sorted(resources.bundled_specs().glob("*.yaml"))
+REFERENCES = json.loads(Path(__file__).with_name("references.json").read_text(encoding="utf-8"))["references"]
+
+
+@pytest.mark.parametrize("path", SPECS, ids=lambda path: path.stem)
+def test_spec_is_documented_and_has_an_experiment(path):
+    system = spec.load(path)
+    assert system.name == path.stem
+    assert system.title
+    assert system.description
+    assert system.references
+    assert system.runs
+
+
+@pytest.mark.parametrize("name", REFERENCES)
+def test_reference_state_belongs_to_the_run_of_the_spec(name):
+    system, expected = spec.load(resources.bundled_specs() / f"{name}.yaml"), REFERENCES[name]
+    run = system.runs["reference"]
+    assert run.step * run.steps == expected["time"]
+    assert system.order == expected["order"]
+    assert len(expected["state"]) == system.dimension
