@@ -77,13 +77,15 @@ def series_of(system: System, realisation: BiRealisation, terms: int) -> Polynom
 
 def generating_function(system: System, realisation: BiRealisation, terms: int) -> GeneratingFunction:
     """∇S_h and Hess S_h in the cheapest form."""
-    static = system.parameter_names
-    candidates = collected_form(series_of(system, realisation, terms), system.coordinates, static)
-    if terms <= GRAPH_TERMS or not candidates:
-        graph = graph_series(
-            system.hamiltonian, realisation.alpha, system.coordinates, terms, symmetric=realisation.symmetric
-        )
-        candidates.append(graph_form(graph, system.coordinates, static))
+    coordinates, static, symmetric = system.coordinates, system.parameter_names, realisation.symmetric
+    candidates = []
+    if terms <= GRAPH_TERMS:
+        graph = graph_series(system.hamiltonian, realisation.alpha, coordinates, terms, symmetric=symmetric)
+        candidates.append(graph_form(graph, coordinates, static))
+    worth = min((c.cost() for c in candidates), default=MOST_OPERATIONS)
+    candidates = [*collected_form(series_of(system, realisation, terms), coordinates, static, worth), *candidates]
+    if not candidates:
+        raise too_large(system, f"S_1 … S_{terms} have too many terms")
     return min(candidates, key=GeneratingFunction.cost)
 
 
@@ -143,15 +145,12 @@ def build_program(
 def _within_budget(kernel: Kernel, system: System) -> None:
     operations = cost(kernel.roots)
     if operations > MOST_OPERATIONS:
-        raise LimitError(
-            [
-                Diagnostic(
-                    f"the kernel {kernel.name} would take {operations} operations, more than {MOST_OPERATIONS}",
-                    system.locations.get(("order",)),
-                    "ask for a lower order",
-                )
-            ]
-        )
+        raise too_large(system, f"{kernel.name} would take {operations} operations, more than {MOST_OPERATIONS}")
+
+
+def too_large(system: System, reason: str) -> LimitError:
+    """The error for a program beyond the budget."""
+    return LimitError([Diagnostic(reason, system.locations.get(("order",)), "ask for a lower order")])
 
 
 def _step_kernels(

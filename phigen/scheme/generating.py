@@ -21,9 +21,6 @@ from phigen.symbolic.expression import Expression, derivatives, gradient, symbol
 #: The step size, as a symbol.
 STEP = "h:"
 
-#: A collected form with more terms than this is not tried: its Hessian would take minutes to print.
-MOST_TERMS = 20_000
-
 
 @dataclass(frozen=True)
 class GeneratingFunction:
@@ -45,16 +42,21 @@ class GeneratingFunction:
 
 
 def collected_form(
-    series: PolynomialSeries, coordinates: Sequence[str], static: Sequence[str]
+    series: PolynomialSeries, coordinates: Sequence[str], static: Sequence[str], worth: int
 ) -> list[GeneratingFunction]:
-    """The collected gradient, with the Hessian collected entry by entry, and with the Hessian by differentiation."""
+    """The collected gradient, with the Hessian collected entry by entry, and with the Hessian by differentiation.
+
+    Empty if even a gradient of one operation per term would cost more than ``worth``.
+    """
     tower, n = series.tower, len(coordinates)
     h = tower.variable(STEP)
     s = tower.combine(term * h ** (i + 1) for i, term in enumerate(series.terms))
-    if len(s) > MOST_TERMS:
+    if len(s) > 10 * worth:  # many terms may share a monomial in the coordinates, but not that many
         return []
     ring, (terms,) = collect(tower, [s], coordinates)
     first = [ring.derivative(terms, j) for j in range(n)]
+    if sum(len(g) for g in first) > worth:
+        return []
     found = []
     for entrywise in (True, False):
         table = Coefficients([*static, STEP])

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from phigen._version import __version__
 from phigen.spec.model import Parameter
 from phigen.symbolic.expression import Expression
 
@@ -69,6 +70,11 @@ class Program:
     spec_sha256: str = ""
     facts: tuple[str, ...] = ()
     operations: Mapping[str, int] = field(default_factory=dict)
+
+    @property
+    def version(self) -> str:
+        """The version of phigen that made this program."""
+        return __version__
 
     @property
     def driver_unit(self) -> str:

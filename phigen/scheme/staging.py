@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from phigen.symbolic.expression import Expression, fold, rebuild, substitute, symbol, topological
+from phigen.symbolic.expression import Expression, fold, rebuild, substitute, symbol, symbols_of, topological
 
 
 class Coefficients:
@@ -30,19 +30,23 @@ class Coefficients:
         def visit(e: Expression, args: list[Expression]) -> Expression:
             if fixed[id(e)]:
                 return e
-            ready = [self.slot(a) if fixed[id(a)] else b for a, b in zip(e.args, args, strict=True)]
+            ready = [self.slot(self._written_out(a)) if fixed[id(a)] else b for a, b in zip(e.args, args, strict=True)]
             return rebuild(e, ready)
 
         done = fold(roots, visit)
-        return [self.slot(r) if fixed[id(r)] else d for r, d in zip(roots, done, strict=True)]
+        return [self.slot(self._written_out(r)) if fixed[id(r)] else d for r, d in zip(roots, done, strict=True)]
 
     def slot(self, e: Expression) -> Expression:
         """The coefficient that stands for a state-independent expression; a number stands for itself."""
-        if e.is_number or (e.op == "symbol" and e.value.startswith("c:")):
+        if e.is_number:
             return e
-        (e,) = substitute([e], {f"c:{k}": v for k, v in enumerate(self.values)})
         k = self._index.get(id(e))
         if k is None:
             k = self._index[id(e)] = len(self.values)
             self.values.append(e)
         return symbol(f"c:{k}")
+
+    def _written_out(self, e: Expression) -> Expression:
+        """The expression with coefficients that occur in it replaced by what they stand for."""
+        used = [n for n in symbols_of(e) if n.startswith("c:")]
+        return substitute([e], {n: self.values[int(n[2:])] for n in used})[0] if used else e

@@ -71,14 +71,12 @@ def decide_elements(
     name: str, tower: Tower, residuals: Iterable[tuple[str, Poly]], positive: Collection[str] = (), detail: str = ""
 ) -> Statement:
     """`decide_zero` for elements of a tower."""
-    pending: list[tuple[str, Expression]] = []
-    for label, element in residuals:
-        if not tower.is_zero(element):
-            pending.append((label, tower.expression(element)))
+    pending = [(label, element) for label, element in residuals if not tower.is_zero(element)]
     if not pending:
         return Statement(name, PROVED, detail)
     fewest = POINTS
-    for label, expression in pending:
+    for label, element in pending:
+        expression = tower.expression(element)
         found = _refuting_point(expression, positive)
         if isinstance(found, str):
             where = f"{label}, " if label else ""

@@ -44,39 +44,45 @@ def lower(kernel: Kernel) -> Code:
 
 
 def parts(code: Code, size: int) -> list[Code]:
-    """The code cut into pieces of at most ``size`` assignments, each store in the last piece it needs.
+    """The code cut into pieces of at most ``size`` statements, each store as early as its value is known.
 
     Long functions compile in quadratic time. A temporary ``t:k`` that a later piece reads becomes ``w:j``, an
     entry of a workspace array.
     """
-    if len(code.assignments) <= size:
+    if len(code.assignments) + len(code.stores) <= size:
         return [code]
-    chunks = [code.assignments[i : i + size] for i in range(0, len(code.assignments), size)]
-    home = {a.target: k for k, chunk in enumerate(chunks) for a in chunk}
-    stores: list[list[Store]] = [[] for _ in chunks]
+    position = {a.target: k for k, a in enumerate(code.assignments)}
+    ready: dict[int, list[Store]] = {}
     for s in code.stores:
-        stores[max((home.get(n, 0) for n in _reads([s.value])), default=0)].append(s)
+        ready.setdefault(max((position.get(n, 0) for n in _reads([s.value])), default=0), []).append(s)
+    statements: list[Assignment | Store] = []
+    for k, a in enumerate(code.assignments):
+        statements += [a, *ready.get(k, [])]
+    chunks = [statements[i : i + size] for i in range(0, len(statements), size)]
+    home = {s.target: k for k, chunk in enumerate(chunks) for s in chunk if isinstance(s, Assignment)}
     crossing: dict[str, str] = {}
     for k, chunk in enumerate(chunks):
-        for n in _reads([*(a.value for a in chunk), *(s.value for s in stores[k])]):
+        for n in _reads([s.value for s in chunk]):
             if n in home and home[n] != k and n not in crossing:
                 crossing[n] = f"w:{len(crossing)}"
-    return [_renamed(chunk, stores[k], crossing) for k, chunk in enumerate(chunks)]
+    return [_renamed(chunk, crossing) for chunk in chunks]
 
 
 def _reads(values: Sequence[Expression]) -> list[str]:
     return [e.value for e in topological(values) if e.op == "symbol"]
 
 
-def _renamed(chunk: Sequence[Assignment], stores: Sequence[Store], names: dict[str, str]) -> Code:
+def _renamed(chunk: Sequence[Assignment | Store], names: dict[str, str]) -> Code:
     def visit(e: Expression, args: list[Expression]) -> Expression:
         if e.op == "symbol":
             return symbol(names.get(e.value, e.value))
         return raw(e.op, tuple(args), e.value) if e.args else e
 
-    values = fold([*(a.value for a in chunk), *(s.value for s in stores)], visit)
-    assignments = tuple(
-        Assignment(names.get(a.target, a.target), v) for a, v in zip(chunk, values[: len(chunk)], strict=True)
-    )
-    kept = tuple(Store(s.array, s.index, v) for s, v in zip(stores, values[len(chunk) :], strict=True))
-    return Code(assignments, kept, frozenset(_reads(values)))
+    values = fold([s.value for s in chunk], visit)
+    assignments, stores = [], []
+    for s, v in zip(chunk, values, strict=True):
+        if isinstance(s, Assignment):
+            assignments.append(Assignment(names.get(s.target, s.target), v))
+        else:
+            stores.append(Store(s.array, s.index, v))
+    return Code(tuple(assignments), tuple(stores), frozenset(_reads(values)))

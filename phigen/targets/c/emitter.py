@@ -4,13 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-import jinja2
-
-from phigen import resources
-from phigen._version import __version__
 from phigen.scheme.program import Program
-from phigen.targets.c.kernels import function, member, wrapped_arguments
+from phigen.targets.c.kernels import apart, function, member, wrapped_arguments
 from phigen.targets.header import CHECKSUM, checksum, header_lines, plain
+from phigen.targets.rendering import render
 
 #: Backward differences kept for the starting guess of the inner solve.
 HISTORY = 8
@@ -38,15 +35,7 @@ def _sealed(program: Program, command: str, body: str) -> str:
 
 
 def _render(template: str, values: Mapping[str, object]) -> str:
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(resources.templates() / "c"),
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-        autoescape=False,  # noqa: S701 - this is C, and all text of the user has passed `plain`
-    )
-    return environment.get_template(template + ".jinja").render(values)
+    return render("c", template, values)
 
 
 def _values(program: Program) -> dict[str, object]:
@@ -58,7 +47,7 @@ def _values(program: Program) -> dict[str, object]:
         "order": program.order,
         "casimir_count": len(program.casimirs),
         "casimir_size": max(1, len(program.casimirs)),
-        "version": __version__,
+        "version": program.version,
         "sha256": program.spec_sha256,
         "coefficients": max(1, program.coefficients),
         "history": HISTORY,
@@ -72,6 +61,7 @@ def _values(program: Program) -> dict[str, object]:
         "max_iterations": program.max_iterations,
         "tolerance": repr(program.tolerance),
         **{f"{key}_signature": "\n".join(lines) for key, lines in _signatures(program).items()},
+        "apart": apart(program),
         "pivoting": f"{program.name}_solve" + ("_pivoting" if "eliminate" in program.kernels else ""),
     }
 
@@ -112,4 +102,6 @@ def _body(program: Program) -> str:
         pieces += [_render("size_relative.c" if program.relative else "size.c", values)]
         pieces += [_render("newton.c", values), _render("step.c", values)]
     pieces += [_render("api.c", values), static("energy"), exported("casimirs"), exported("vector_field")]
+    if any(apart(program) in piece for piece in pieces):
+        pieces.insert(1, _render("apart.c", values))
     return "\n".join([*pieces, _render("observables.c", values)])

@@ -82,7 +82,7 @@ def _signature(
         arguments.append(f"double {o.name}[{size}]")
     if workspace:
         arguments.append(f"double work[restrict {workspace}]")
-    text = ("void " if exported else "static void ") + name + "("
+    text = ("void " if exported else f"{apart(program)} static void " if workspace else "static void ") + name + "("
     return wrapped_arguments(text, arguments)
 
 
@@ -131,6 +131,11 @@ def _body(program: Program, kernel: Kernel, code: Code, workspace: int, *, expor
     if exported and "params" in touched:
         head.append(f"    if (params == NULL) params = &{program.name}_default_params;")
     return [*head, *lines]
+
+
+def apart(program: Program) -> str:
+    """The macro that keeps the parts of a long function from being inlined into one again."""
+    return f"{program.name}_APART"
 
 
 def member(name: str) -> str:

@@ -1,0 +1,1 @@
+"""The NumPy target: one module, NumPy only, vectorised over leading axes."""

@@ -1,0 +1,123 @@
+"""A program as a Python module: `NAME.py`."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Sequence
+
+from phigen.scheme.program import Kernel, Program
+from phigen.symbolic.expression import Expression
+from phigen.targets.code import Code, lower
+from phigen.targets.header import CHECKSUM, checksum, header_lines, plain
+from phigen.targets.names import PYTHON_RESERVED, Scope
+from phigen.targets.printer import Printer
+from phigen.targets.rendering import render
+
+FUNCTIONS = {
+    "asin": "np.arcsin",
+    "acos": "np.arccos",
+    "atan": "np.arctan",
+    "atan2": "np.arctan2",
+    "asinh": "np.arcsinh",
+    "acosh": "np.arccosh",
+    "atanh": "np.arctanh",
+    "abs": "np.abs",
+    "power": "np.power",
+    "sign": "np.sign({0})",
+} | {name: f"np.{name}" for name in "exp log sin cos tan sinh cosh tanh sqrt cbrt".split()}
+CONSTANTS = {"pi": "np.pi", "E": "np.e"}
+
+
+def emit(program: Program, command: str) -> dict[str, str]:
+    """The file name and its contents."""
+    kernels = program.kernels
+    pieces = [render("numpy", "preamble.py", _values(program)), _function(program, kernels["prepare"])]
+    if program.driver == "explicit":
+        pieces += [_function(program, kernels["explicit"]), render("numpy", "explicit.py", _values(program))]
+    else:
+        pieces += [_function(program, kernels["linearise"]), render("numpy", "newton.py", _values(program))]
+    pieces += [render("numpy", "api.py", _values(program))]
+    pieces += [_function(program, kernels[k]) for k in ("energy", "casimirs", "vector_field")]
+    pieces += [render("numpy", "observables.py", _values(program))]
+    body = "\n\n".join(p.strip("\n") + "\n" for p in pieces)
+    comment = "\n".join(f"# {line}".rstrip() for line in header_lines(program, command))
+    return {f"{program.name}.py": f"{comment}\n# {CHECKSUM} {checksum(body)}\n{body}"}
+
+
+def _values(program: Program) -> dict[str, object]:
+    return {
+        "title": plain(program.title) or program.name,
+        "n": program.dimension,
+        "order": program.order,
+        "version": program.version,
+        "sha256": program.spec_sha256,
+        "coordinates": _strings(program.coordinates),
+        "casimirs": _strings(program.casimirs),
+        "defaults": [f'"{p.name}": {float(p.value)!r}' for p in program.parameters],
+        "max_iterations": program.max_iterations,
+        "tolerance": repr(program.tolerance),
+        # The floor of the scale of a component: see _size.
+        "floor": "0.0" if program.relative else "1e-6",
+    }
+
+
+def _strings(names: Sequence[str]) -> str:
+    return "(" + "".join(f'"{n}", ' for n in names).rstrip() + ")"
+
+
+def _function(program: Program, kernel: Kernel) -> str:
+    code = lower(kernel)
+    arguments = ", ".join("parameters" if i == "params" else i for i in kernel.inputs)
+    lines = [f"def _{kernel.name}({arguments}):", *_docstring(kernel.purpose)]
+    scope = Scope({*PYTHON_RESERVED, *kernel.inputs, *(o.name for o in kernel.outputs)})
+    lines += _bindings(kernel, code, scope)
+    printer = Printer(lambda n: scope[n], FUNCTIONS, CONSTANTS, "np.power")
+    lines += [f"    {scope[a.target]} = {printer(a.value)}" for a in code.assignments]
+    lines.append(_result(program, kernel, code, printer))
+    return "\n".join(lines) + "\n"
+
+
+def _docstring(text: str) -> list[str]:
+    quoted = f'"""{plain(text).replace(chr(34), chr(39)).capitalize()}."""'
+    return textwrap.wrap(quoted, 104, initial_indent="    ", subsequent_indent="    ")
+
+
+def _bindings(kernel: Kernel, code: Code, scope: Scope) -> list[str]:
+    lines = []
+    for array, symbols in kernel.inputs.items():
+        for i, s in enumerate(symbols):
+            if s not in code.used:
+                continue
+            if array == "h":
+                scope.bind(s, "h")
+            elif array == "params":
+                lines.append(f'    {scope[s]} = parameters["{s}"]')
+            elif ":" in s:
+                scope.bind(s, f"{array}[{i}]")
+            else:
+                lines.append(f"    {scope[s]} = {array}[..., {i}]")
+    return lines
+
+
+def _result(program: Program, kernel: Kernel, code: Code, printer: Printer) -> str:
+    values: dict[str, list[Expression]] = {o.name: [] for o in kernel.outputs}
+    for s in code.stores:
+        values[s.array].append(s.value)
+    if kernel.name == "prepare":
+        return "    return " + _list([printer(v) for v in values["coef"]])
+    state = next(a for a in kernel.inputs if a not in ("coef", "params"))
+    n = program.dimension
+    arrays = []
+    for name, entries in values.items():
+        array = f"_filled({state}, {_list([printer(e) for e in entries])})"
+        arrays.append(array + (f".reshape({state}.shape + ({n},))" if name.endswith("jacobian") else ""))
+    if len(arrays) == 1:
+        return f"    return {arrays[0]}"
+    return "    return (\n" + "".join(f"        {a},\n" for a in arrays) + "    )"
+
+
+def _list(items: Sequence[str]) -> str:
+    text = "[" + ", ".join(items) + "]"
+    if len(text) < 90:
+        return text
+    return "[\n" + "".join(f"            {i},\n" for i in items) + "        ]"
