@@ -113,8 +113,6 @@ class Field:
                 return args[0] * args[1]
             case "pow" if _integer_power(node):
                 return args[0] ** int(node.value)
-        if args:  # inside an atom: its value is not used
-            return args[0]
         raise KeyError(str(node))
 
     def expression(self, element: Scalar) -> Expression:

@@ -113,19 +113,23 @@ def _bracket_of_pair(
 
 
 def _expect_jacobi(algebra: LieAlgebra) -> None:
-    for i, j, k in combinations(range(algebra.dimension), 3):
-        residuals = jacobi_residuals(algebra, i, j, k)
-        if residuals and decide_zero("Jacobi", [("", r) for r in residuals.values()]).verdict == REFUTED:
-            component, residual = next(iter(residuals.items()))
-            triple = f"(E{i + 1}, E{j + 1}, E{k + 1})"
-            raise SpecError(
-                [
-                    Diagnostic(
-                        f"structure constants: the Jacobi identity fails for {triple}; "
-                        f"the sum of the cyclic double brackets is not 0 in E{component + 1}: {shortened(residual)}"
-                    )
-                ]
-            )
+    failing = failing_jacobi(algebra)
+    if failing is not None:
+        (i, j, k), component, residual = failing
+        message = (
+            f"structure constants: the Jacobi identity fails for (E{i + 1}, E{j + 1}, E{k + 1}); "
+            f"the sum of the cyclic double brackets is not 0 in E{component + 1}: {shortened(residual)}"
+        )
+        raise SpecError([Diagnostic(message)])
+
+
+def failing_jacobi(algebra: LieAlgebra) -> tuple[tuple[int, int, int], int, Expression] | None:
+    """The first triple whose cyclic double brackets do not add up to 0, a component and its value; None if all do."""
+    for triple in combinations(range(algebra.dimension), 3):
+        for component, residual in jacobi_residuals(algebra, *triple).items():
+            if decide_zero("Jacobi", [("", residual)]).verdict == REFUTED:
+                return triple, component, residual
+    return None
 
 
 def jacobi_residuals(algebra: LieAlgebra, i: int, j: int, k: int) -> dict[int, Expression]:

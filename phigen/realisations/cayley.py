@@ -17,13 +17,15 @@ from fractions import Fraction
 from phigen.geometry.field import Field, Scalar
 from phigen.geometry.lie_algebra import LieAlgebra, Representation
 from phigen.geometry.linear import Span, add_multiple
+from phigen.geometry.matrix_algebras import failing_jacobi
 from phigen.geometry.representations import candidates, indecomposable_parts, restricted
 from phigen.geometry.shapes import LiePoisson
 from phigen.geometry.system import System, hamiltonian_vector_field
-from phigen.realisations.protocol import PAPER, BiRealisation, covector_symbols, refuse, reversed_covector
+from phigen.realisations.protocol import PAPER, BiRealisation, covector_symbols, is_symmetric, refuse, reversed_covector
 from phigen.spec.model import BirealisationChoice
-from phigen.symbolic.expression import Expression, number, symbol
+from phigen.symbolic.expression import ONE, Expression, number, symbol
 from phigen.symbolic.horner import horner
+from phigen.symbolic.verdict import shortened
 
 KIND = "cayley"
 
@@ -60,20 +62,32 @@ def build(system: System, choice: BirealisationChoice) -> BiRealisation:
             for (row, a, b, k), c in terms.items()
             if row == i
         }
-        curvature = number(Fraction(1, 4)) * horner(quadratic, [*p, *x])
-        displacement.append(-(number(Fraction(1, 2)) * increment[i]) - curvature)
+        curvature = _factored(quadratic, [*p, *x])
+        displacement.append(-(number(Fraction(1, 2)) * increment[i]) - number(Fraction(1, 4)) * curvature)
     alpha = tuple(xi + d for xi, d in zip(x, displacement, strict=True))
+    beta = tuple(reversed_covector(alpha, system.coordinates))
     return BiRealisation(
         KIND,
         system.coordinates,
         alpha,
-        tuple(reversed_covector(alpha, system.coordinates)),
+        beta,
         tuple(displacement),
         increment,
-        symmetric=True,  # β is made by reversing p in α
+        is_symmetric(alpha, beta, system.coordinates),
         explanation=f"π is linear: Cayley transform, {explanation}; symmetric",
         reference=f"{PAPER}, the proposition on Lie–Poisson structures and its example so(n), with 2 for 4",
     )
+
+
+def _factored(terms: dict[tuple[int, ...], Expression], variables: Sequence[Expression]) -> Expression:
+    """Horner form, with a coefficient that all terms have up to sign in front.
+
+    For so(3) this leaves p_i (p·x), and the p·x of all components is one node.
+    """
+    common = next(iter(terms.values()), ONE)
+    if any(c is not common and c is not -common for c in terms.values()):
+        return horner(terms, variables)
+    return common * horner({m: ONE if c is common else -ONE for m, c in terms.items()}, variables)
 
 
 def closed_product(algebra: LieAlgebra) -> tuple[Trilinear, str]:
@@ -99,6 +113,7 @@ def closed_product(algebra: LieAlgebra) -> tuple[Trilinear, str]:
                 break
             tried[representation.name] = _refusal(ideal, representation, found)
         else:
+            _expect_poisson(algebra)
             tried = tried or {"": f"no faithful representation of {ideal.name} was found"}
             raise refuse(
                 f"birealisation {KIND} does not apply to {algebra.name}: {'; '.join(tried.values())}",
@@ -108,6 +123,18 @@ def closed_product(algebra: LieAlgebra) -> tuple[Trilinear, str]:
     if len(used) == 1 and max(map(len, used.values())) == 1:
         return terms, f"with {next(iter(used))}"
     return terms, "with " + "; ".join(f"{name} for {', '.join(parts)}" for name, parts in used.items())
+
+
+def _expect_poisson(algebra: LieAlgebra) -> None:
+    """A better error where π is linear but no Poisson tensor, so that no representation can exist."""
+    failing = failing_jacobi(algebra)
+    if failing is not None:
+        triple, component, residual = failing
+        labels = ", ".join(algebra.label(i) for i in triple)
+        raise refuse(
+            f"birealisation {KIND} does not apply: π is linear, but its Jacobi identity fails for ({labels})",
+            f"the cyclic double brackets add up to a multiple of {algebra.label(component)}: {shortened(residual)}",
+        )
 
 
 def _refusal(algebra: LieAlgebra, representation: Representation, escape: _Escape) -> str:
