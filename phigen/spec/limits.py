@@ -10,7 +10,7 @@ from fractions import Fraction
 #: Size of a spec file, in bytes.
 FILE_BYTES = 512 * 1024
 #: YAML nodes (scalars, sequences, mappings, keys) in a file.
-YAML_NODES = 50_000
+YAML_NODES = 20_000
 #: Nesting of YAML collections.
 YAML_DEPTH = 32
 #: Length of the text of one expression, in characters.

@@ -1,0 +1,110 @@
+"""The JSON Schema and the validator say the same, and the starter spec obeys both."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from jsonschema import Draft202012Validator
+from ruamel.yaml import YAML
+from spec.text_pairs import cases, complete
+
+from phigen.errors import SpecError
+from phigen.spec import loads, schema, starter
+from phigen.spec.fields import SPEC
+from phigen.spec.kinds import Either, Field, Kind, ListOf, MapOf, Record
+from phigen.spec.names import KEYWORDS, PLANNED, TAKEN
+
+
+def conforms(text: str) -> bool:
+    return bool(Draft202012Validator(schema()).is_valid(YAML(typ="safe", pure=True).load(text)))
+
+
+def test_schema_is_a_schema() -> None:
+    Draft202012Validator.check_schema(schema())
+
+
+ACCEPTED = [pytest.param(complete(s), id=t) for t, s, e in cases() if not e]
+
+
+@pytest.mark.parametrize("text", ACCEPTED)
+def test_what_is_accepted_conforms_to_the_schema(text: str) -> None:
+    loads(text)
+    assert conforms(text)
+
+
+@pytest.mark.parametrize(
+    "fragment",
+    [
+        "nmae: a",
+        "phigen: 2",
+        "name: A",
+        "coordinates: [x-y]",
+        "coordinates: []",
+        "parameters: {I1: {positive: true}}",
+        "parameters: {I1: {value: 1, positive: yes}}",
+        "poisson: {}",
+        "poisson: {nambu: [x1], canonical: {q: [x2], p: [x3]}}",
+        "birealisation: caley",
+        "birealisation: exponential",
+        "{order: 1, terms: 1}",
+        "order: 17",
+        "solver: {max_iterations: 0}",
+        "targets: []",
+        "targets: [fortran]",
+        "runs: {a: {initial: [1, 1, 1], step: 1}}",
+        "runs: {a: {initial: [1, 1, 1], step: 1, steps: 1, duration: 1}}",
+        "runs: {a: {initial: [1, 1, 1], step: 1, steps: 1, compare: rk4}}",
+        "gauge: {C: x1}",
+    ],
+)
+def test_what_the_schema_refuses_the_validator_refuses(fragment: str) -> None:
+    text = complete(
+        fragment.strip("{}").replace(", terms", "\nterms") + "\n" if fragment[0] == "{" else fragment + "\n"
+    )
+    assert not conforms(text)
+    with pytest.raises(SpecError):
+        loads(text)
+
+
+def fields_below(kind: Kind) -> list[Field]:
+    """Every field of the table."""
+    match kind:
+        case Record():
+            return [g for f in kind.fields for g in (f, *fields_below(f.kind))]
+        case ListOf():
+            return fields_below(kind.item)
+        case MapOf():
+            return fields_below(kind.value)
+        case Either():
+            return [f for k in kind.kinds.values() for f in fields_below(k)]
+    return []
+
+
+def test_every_key_is_described_for_editors() -> None:
+    found: list[Any] = fields_below(SPEC)
+    assert len(found) > 40
+    assert all(f.description for f in found)
+
+
+def test_planned_is_refused_as_planned() -> None:
+    for key, words in PLANNED.items():
+        for word in words:
+            value = f"{{{word}: []}}" if key == "poisson" else word
+            with pytest.raises(SpecError, match=f"{word} is planned and not available in this version"):
+                loads(complete(f"{key}: {value}\n"))
+
+
+@pytest.mark.parametrize("name", ["a", "rigid_body", "x" * 31, "a1_", "body__2"])
+def test_starter_loads_and_conforms_for_every_valid_name(name: str) -> None:
+    text = starter(name)
+    assert loads(text).name == name
+    assert conforms(text)
+
+
+@pytest.mark.parametrize(
+    "name", ["", "A", "1a", "x" * 32, "a-b", "a b", "a\nb", "a: b", "{name}", "ünit", *sorted(KEYWORDS | TAKEN)]
+)
+def test_starter_refuses_other_names(name: str) -> None:
+    with pytest.raises(SpecError):
+        starter(name)

@@ -1,0 +1,48 @@
+"""Reading errors.txt: pairs of a spec and the errors it gives."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from phigen.errors import SpecError
+from phigen.spec import loads
+
+MINIMAL = {
+    "phigen": "1",
+    "name": "minimal",
+    "coordinates": "[x1, x2, x3]",
+    "poisson": "{lie_algebra: {name: so(3)}}",
+    "hamiltonian": "x1**2",
+}
+
+
+def complete(fragment: str) -> str:
+    """The fragment with the keys of the minimal spec that it lacks below it, so that its lines count from 1."""
+    missing = [f"{k}: {v}\n" for k, v in MINIMAL.items() if not re.search(rf"^{k}:", fragment, re.MULTILINE)]
+    return fragment + "".join(missing)
+
+
+def errors_of(text: str) -> str:
+    """What `loads` reports, in the notation of errors.txt."""
+    try:
+        loads(text)
+    except SpecError as error:
+        lines = []
+        for d in error.diagnostics:
+            assert d.location is not None
+            lines.append(f"{d.location.line}:{d.location.column}: {d.message}\n")
+            lines += [f"  hint: {d.hint}\n"] if d.hint else []
+        return "".join(lines)
+    return ""
+
+
+def cases() -> list[tuple[str, str, str]]:
+    """Title, spec and expected errors of every case."""
+    text = Path(__file__).with_name("errors.txt").read_text(encoding="utf-8")
+    found = []
+    for part in re.split(r"^== ", text, flags=re.MULTILINE)[1:]:
+        title, _, rest = part.partition("\n")
+        spec, _, expected = rest.partition("\n--\n")
+        found.append((title, spec + "\n", expected.rstrip("\n") + "\n" if expected.strip() else ""))
+    return found
