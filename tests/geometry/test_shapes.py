@@ -1,0 +1,65 @@
+"""Recognition of what a π is, however it was typed, with parameters in it."""
+
+import pytest
+from geometry.building import family, system, typed
+
+from phigen.geometry.lie_algebra import LieAlgebra
+from phigen.geometry.shapes import Canonical, Constant, General, LiePoisson, LogCanonical
+
+PARAMETERS = "parameters: {m: 2, l: {value: 3, positive: true}}"
+
+
+def shape(coordinates, poisson):
+    return system(coordinates, poisson, extra=PARAMETERS).shape
+
+
+def test_canonical_pairs_are_found_in_any_order_and_sign():
+    found = shape("p q z y b", "{brackets: {q: {p: 1}, y: {b: '2/2'}}}")
+    assert isinstance(found, Canonical)
+    assert (found.q, found.p, found.rest) == (("q", "y"), ("p", "b"), ("z",))
+
+
+@pytest.mark.parametrize("value", ["2", "1/m", "m-1"])
+def test_scaled_pairs_are_constant_but_not_canonical(value):
+    assert isinstance(shape("q p", f"{{brackets: {{q: {{p: {value}}}}}}}"), Constant)
+
+
+def test_chained_unit_brackets_are_constant_but_not_canonical():
+    assert isinstance(shape("x y z", "{brackets: {x: {y: 1}, y: {z: 1}}}"), Constant)
+
+
+def test_coordinates_that_cancel_do_not_count():
+    assert isinstance(shape("q p", "{brackets: {q: {p: '(q+p)**2 - q**2 - 2*q*p - p**2 + 1'}}}"), Canonical)
+
+
+def test_log_canonical_with_parameters():
+    found = shape("x y z", "{brackets: {x: {y: 'sqrt(l)*x*y'}, y: {z: -y*z/m}}}")
+    assert isinstance(found, LogCanonical)
+    assert [str(e) for e in found.a[1]] == ["-sqrt(l)", "0", "-1/m"]
+
+
+@pytest.mark.parametrize("entry", ["x*y + 1", "x*y**2", "x*x", "x*y*exp(x)", "x"])
+def test_almost_log_canonical_is_not(entry):
+    assert not isinstance(shape("x y z", f"{{brackets: {{x: {{y: '{entry}'}}}}}}"), LogCanonical)
+
+
+def test_rigid_body_with_inertia_in_the_bracket_is_a_lie_algebra():
+    found = shape("x y z", "{brackets: {x: {y: -z/m, z: y/l}, y: {z: -x}}}")
+    assert isinstance(found, LiePoisson)
+    assert isinstance(found.algebra, LieAlgebra)
+    written = {ij: {k: str(c) for k, c in row.items()} for ij, row in found.algebra.constants.items()}
+    assert written == {(0, 1): {2: "-1/m"}, (0, 2): {1: "1/l"}, (1, 2): {0: "-1"}}
+
+
+def test_structure_constants_survive_typing_as_a_matrix():
+    original = family("sp", 4)
+    assert typed(original).lie_algebra.constants == original.lie_algebra.constants
+
+
+@pytest.mark.parametrize("entry", ["x + 1", "x**2", "sin(x)", "x/y", "sqrt(x)", "x*z", "abs(x)"])
+def test_the_rest_is_general(entry):
+    assert isinstance(shape("x y z", f"{{brackets: {{x: {{y: '{entry}'}}}}}}"), General)
+
+
+def test_abelian_lie_algebra_is_constant():
+    assert isinstance(family("so", 2).shape, Constant)

@@ -1,0 +1,84 @@
+"""Systems from sympy, and formulas back to sympy."""
+
+from fractions import Fraction
+
+import pytest
+import sympy
+
+from phigen.errors import SpecError
+from phigen.geometry.shapes import LiePoisson
+from phigen.geometry.sympy_bridge import expression, to_sympy
+from phigen.geometry.system import System
+from phigen.symbolic.expression import FUNCTIONS, call, symbol
+from phigen.symbolic.verdict import PROVED, decide_zero
+
+x, y, z = sympy.symbols("x y z")
+a = sympy.Symbol("a", positive=True)
+
+
+def test_rigid_body_from_sympy():
+    s = System.from_sympy(
+        [x, y, z],
+        [[0, -z, y], [z, 0, -x], [-y, x, 0]],
+        x**2 / (2 * a) + y**2,
+        {a: sympy.Rational(5, 2)},
+        casimirs={"C": x**2 + y**2 + z**2},
+        invariants={"H2": x**2 / (2 * a) + y**2},
+        name="body",
+    )
+    assert isinstance(s.shape, LiePoisson)
+    assert (s.name, s.coordinates, s.parameter_names, s.positive) == ("body", ("x", "y", "z"), ("a",), ("a",))
+    assert s.parameters[0].value == Fraction(5, 2)
+    assert list(s.casimirs) == ["C"]
+    assert str(s.vector_field()[0]) == "(-2)*(y*z)"
+
+
+@pytest.mark.parametrize("name", sorted(set(FUNCTIONS) - {"power"}))
+def test_every_function_goes_to_sympy_and_back(name):
+    e = call(name, *[symbol("x"), symbol("y")][: FUNCTIONS[name]])
+    back = expression(to_sympy(e))
+    assert decide_zero("round trip", [("", back - e)], positive=["x"]).holds
+
+
+def test_arithmetic_goes_to_sympy_and_back():
+    u, v = symbol("u"), symbol("p:v")
+    e = (u - v) ** 3 / (1 + u * v) - 2 * u ** Fraction(1, 2) / 3
+    (difference,) = [expression(to_sympy(e)) - e]
+    assert "p_v" in str(difference)
+    from phigen.symbolic.expression import substitute
+
+    (difference,) = substitute([difference], {"p_v": v})
+    assert decide_zero("round trip", [("", difference)]).verdict == PROVED
+
+
+def test_floats_are_the_decimals_they_print():
+    assert expression(sympy.Float("0.1")).value == Fraction(1, 10)
+    assert expression(0.1).value == Fraction(1, 10)
+
+
+def test_symbolic_exponents_and_constants():
+    assert str(expression(x**a)) == "x**(a)"
+    assert str(expression(sympy.exp(1) * sympy.pi)) == "pi*E"
+
+
+@pytest.mark.parametrize("bad", [sympy.gamma(x), sympy.I * x, sympy.oo, sympy.zoo, sympy.Function("f")(x), "x**2"])
+def test_what_has_no_counterpart_is_refused(bad):
+    with pytest.raises(SpecError):
+        expression(bad)
+
+
+def test_text_is_never_evaluated():
+    with pytest.raises(SpecError, match="text"):
+        System.from_sympy([x, y], [[0, 1], [-1, 0]], "__import__('os')")
+
+
+def test_unknown_and_doubled_symbols_are_errors():
+    with pytest.raises(SpecError, match="unknown symbol z"):
+        System.from_sympy([x, y], [[0, 1], [-1, 0]], x * z)
+    with pytest.raises(SpecError, match="declared twice"):
+        System.from_sympy([x, x], [[0, 1], [-1, 0]], x)
+
+
+def test_matrix_of_the_wrong_size_is_an_error():
+    with pytest.raises(SpecError, match="2×2, but there are 3 coordinates"):
+        System.from_sympy([x, y, z], [[0, 1], [-1, 0]], x)
