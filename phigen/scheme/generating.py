@@ -55,7 +55,7 @@ def collected_form(
         return []
     ring, (terms,) = collect(tower, [s], coordinates)
     first = [ring.derivative(terms, j) for j in range(n)]
-    if sum(len(g) for g in first) > worth:
+    if sum(len(g) for g in first) > max(worth, 200):
         return []
     found = []
     for entrywise in (True, False):
@@ -71,9 +71,7 @@ def collected_form(
     return found
 
 
-def graph_form(
-    series: Sequence[Expression], coordinates: Sequence[str], static: Sequence[str]
-) -> GeneratingFunction:
+def graph_form(series: Sequence[Expression], coordinates: Sequence[str], static: Sequence[str]) -> GeneratingFunction:
     """Gradient by reverse, Hessian by repeated reverse differentiation of the shared graph."""
     h = symbol(STEP)
     s = total(h ** (i + 1) * term for i, term in enumerate(series) if not term.is_zero)

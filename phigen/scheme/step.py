@@ -41,7 +41,9 @@ class Linearised:
     increment_jacobian: Matrix
 
 
-def at_momenta(expressions: Sequence[Expression], coordinates: Sequence[str], slope: Sequence[Expression]) -> list[Expression]:
+def at_momenta(
+    expressions: Sequence[Expression], coordinates: Sequence[str], slope: Sequence[Expression]
+) -> list[Expression]:
     """The expressions with the covector p put equal to ∇S_h."""
     return substitute(expressions, {momentum(c): g for c, g in zip(coordinates, slope, strict=True)})
 
@@ -86,7 +88,10 @@ def explicit_order(displacement: Sequence[Expression], coordinates: Sequence[str
 
 
 def explicit_increment(
-    displacement: Sequence[Expression], increment: Sequence[Expression], coordinates: Sequence[str], order: Sequence[int]
+    displacement: Sequence[Expression],
+    increment: Sequence[Expression],
+    coordinates: Sequence[str],
+    order: Sequence[int],
 ) -> list[Expression]:
     """The increment as a function of x, the equation for y having been solved in the given order."""
     solved: dict[str, Expression] = {}

@@ -269,7 +269,8 @@ def power(base: Expression, exponent: Expression | Number) -> Expression:
     if isinstance(exponent, Expression):
         if not exponent.is_number:
             return call("power", base, exponent)
-        exponent = exponent.value
+        value: Fraction = exponent.value
+        exponent = value
     exponent = Fraction(exponent)
     if exponent == 0:
         return ONE

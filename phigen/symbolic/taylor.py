@@ -147,9 +147,7 @@ class Taylor:
         if a is b:
             pairs = [a[j] * a[i - j] * self.ring.constant(2) for j in range((i + 1) // 2) if not zero(a[j])]
             return self.ring.combine(pairs + ([a[i // 2] * a[i // 2]] if i % 2 == 0 else []))
-        return self.ring.combine(
-            [a[j] * b[i - j] for j in range(i + 1) if not (zero(a[j]) or zero(b[i - j]))]
-        )
+        return self.ring.combine([a[j] * b[i - j] for j in range(i + 1) if not (zero(a[j]) or zero(b[i - j]))])
 
     def _power(self, e: Expression, a: list[Any], i: int) -> Any:
         exponent: Fraction = e.value

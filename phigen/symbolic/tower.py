@@ -21,6 +21,9 @@ from phigen.symbolic.horner import horner
 #: An element of a tower: ``flint.fmpq_mpoly``. Elements of different towers do not mix.
 Poly = Any
 
+_EVEN = frozenset({"cos", "cosh"})
+_ODD = frozenset({"sin", "tan", "asin", "atan", "sinh", "tanh", "asinh", "atanh", "sign"})
+
 
 @dataclass
 class Generator:
@@ -39,7 +42,7 @@ class Generator:
     derivative: dict[str, Poly] = field(default_factory=dict)
 
 
-class _Missing(Exception):
+class _MissingError(Exception):
     """A generator that the ring does not have yet."""
 
     def __init__(self, kind: str, arguments: list[Poly], degree: int = 1, inverse: bool = False) -> None:
@@ -96,10 +99,10 @@ class Tower:
         while True:
             try:
                 return self._convert(e)
-            except _Missing as missing:
+            except _MissingError as missing:
                 self._grow(missing)
 
-    def _grow(self, missing: _Missing) -> None:
+    def _grow(self, missing: _MissingError) -> None:
         name = f"g:{len(self.generators)}"
         arguments = [self.expression(a) for a in missing.arguments]
         self.generators.append(
@@ -143,7 +146,7 @@ class Tower:
         """`convert` for several expressions that share parts."""
         try:
             return fold(expressions, self._visit)
-        except _Missing as missing:
+        except _MissingError as missing:
             raise ValueError(f"the ring has no generator for {missing.kind}") from None
 
     def _convert(self, e: Expression) -> Poly:
@@ -183,9 +186,14 @@ class Tower:
             return self.zero
         if name == "log" and first == 1:
             return self.zero
+        if name in _EVEN | _ODD and rational(first.leading_coefficient()) < 0:
+            # One generator for f(q) and f(-q).
+            mirrored = self._generator(name, [-first])
+            return mirrored if name in _EVEN else -mirrored
         if name == "exp":
             for g in self.generators:
-                if g.kind == "exp" and (ratio := _ratio(first, g.arguments[0])) and ratio > 0 and ratio.denominator == 1:
+                ratio = _ratio(first, g.arguments[0]) if g.kind == "exp" else None
+                if ratio and ratio > 0 and ratio.denominator == 1:
                     return self.variable(g.name) ** int(ratio)
         return self._generator(name, args)
 
@@ -230,7 +238,7 @@ class Tower:
         for g in self.generators:
             if g.kind == kind and g.degree == degree and g.inverse == inverse and g.arguments == args:
                 return self.variable(g.name)
-        raise _Missing(kind, args, degree, inverse)
+        raise _MissingError(kind, args, degree, inverse)
 
     def expression(self, element: Poly) -> Expression:
         """The element as an expression, in Horner form, generators written out."""
@@ -301,19 +309,20 @@ class Tower:
         if partner:
             for other in self.generators:
                 if other.kind == partner and other.arguments == g.arguments:
-                    square = 1 - self.variable(other.name) ** 2 if g.kind == "sin" else 1 + self.variable(other.name) ** 2
+                    square = (
+                        1 - self.variable(other.name) ** 2 if g.kind == "sin" else 1 + self.variable(other.name) ** 2
+                    )
                     own = self.variable(g.name)
                     return self.combine(c * own ** (e % 2) * square ** (e // 2) for e, c in parts.items())
         return element
 
     def _eliminate_root(self, parts: dict[int, Poly], g: Generator) -> Poly:
         base, n, own = g.arguments[0], g.degree, self.variable(g.name)
-        for other in self.generators:
-            if other.kind == "root" and other.degree == n and other.arguments == g.arguments and other is not g:
+        for other in self.generators[: self.generators.index(g)]:
+            if other.kind == "root" and other.degree == n and other.arguments == g.arguments:
                 # w·v = 1: multiplied by a power of the partner, g disappears.
-                if self._index[other.name] < self._index[g.name]:
-                    top, w = max(parts), self.variable(other.name)
-                    return self.combine(c * w ** (top - e) for e, c in parts.items())
+                top, w = max(parts), self.variable(other.name)
+                return self.combine(c * w ** (top - e) for e, c in parts.items())
         if not g.inverse:
             return self.combine(c * own ** (e % n) * base ** (e // n) for e, c in parts.items())
         top = max(e // n for e in parts)

@@ -33,9 +33,7 @@ def lower(kernel: Kernel) -> Code:
     roots = kernel.roots
     named = [e for _, e in kernel.named]
     expanded = expand_powers([*roots, *named])
-    names = {
-        id(e): name for (name, _), e in zip(kernel.named, expanded[len(roots) :], strict=True) if e.args
-    }
+    names = {id(e): name for (name, _), e in zip(kernel.named, expanded[len(roots) :], strict=True) if e.args}
     assignments, trees = assign(expanded[: len(roots)], names)
     places = [(o.name, i) for o in kernel.outputs for i in range(len(o.values))]
     stores = tuple(Store(a, i, t) for (a, i), t in zip(places, trees, strict=True))

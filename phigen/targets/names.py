@@ -23,12 +23,12 @@ j0 j1 jn y0 y1 yn gamma signgam div index time clock exit abort free malloc rand
 
 C_RESERVED = frozenset((_C + " " + _MACROS + " " + _LIBM).split())
 
-PYTHON_RESERVED = frozenset(
-    """False None True and as assert async await break class continue def del elif else except finally for from
-    global if import in is lambda nonlocal not or pass raise return try while with yield match case type np abs
-    print self DIM ORDER CASIMIRS DEFAULT_PARAMETERS StepError step integrate hamiltonian casimirs vector_field
-    x0 steps stride parameters""".split()
-)
+_PYTHON = """False None True and as assert async await break class continue def del elif else except finally for from
+global if import in is lambda nonlocal not or pass raise return try while with yield match case type np abs
+print self DIM ORDER CASIMIRS DEFAULT_PARAMETERS StepError step integrate hamiltonian casimirs vector_field
+x0 steps stride parameters"""
+
+PYTHON_RESERVED = frozenset(_PYTHON.split())
 
 
 class Scope:

@@ -76,9 +76,7 @@ def _signatures(program: Program) -> dict[str, list[str]]:
         "init": wrapped_arguments(f"{status}{name}_init(", [solver, params, f"const double x0[{n}]"]),
         "ensemble": wrapped_arguments(f"{status}{name}_ensemble(", [params, *members]),
         "hamiltonian": wrapped_arguments(f"double {name}_hamiltonian(", [params, f"const double x[{n}]"]),
-        "advance": wrapped_arguments(
-            f"static int {name}_advance(", [solver, *increment, f"const double delta[{n}]"]
-        ),
+        "advance": wrapped_arguments(f"static int {name}_advance(", [solver, *increment, f"const double delta[{n}]"]),
     }
 
 

@@ -11,12 +11,9 @@ from phigen.targets.header import plain
 from phigen.targets.names import C_RESERVED, Scope
 from phigen.targets.printer import Printer
 
-FUNCTIONS = {name: name for name in "exp log sin cos tan asin acos atan atan2 sinh cosh tanh".split()} | {
-    "asinh": "asinh",
-    "acosh": "acosh",
-    "atanh": "atanh",
-    "sqrt": "sqrt",
-    "cbrt": "cbrt",
+_SAME: tuple[str, ...] = ("exp", "log", "sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh")
+_SAME += ("asinh", "acosh", "atanh", "sqrt", "cbrt")
+FUNCTIONS = {name: name for name in _SAME} | {
     "abs": "fabs",
     "power": "pow",
     "sign": "(double)(({0} > 0.0) - ({0} < 0.0))",
@@ -63,9 +60,7 @@ def _definition(
     return "\n".join([*lines, *_body(program, kernel, code, workspace, exported=exported), "}"])
 
 
-def _signature(
-    program: Program, kernel: Kernel, name: str, *, exported: bool = False, workspace: int = 0
-) -> list[str]:
+def _signature(program: Program, kernel: Kernel, name: str, *, exported: bool = False, workspace: int = 0) -> list[str]:
     arguments = [
         f"const {program.name}_params *params"
         if i == "params"

@@ -24,7 +24,7 @@ FUNCTIONS = {
     "abs": "np.abs",
     "power": "np.power",
     "sign": "np.sign({0})",
-} | {name: f"np.{name}" for name in "exp log sin cos tan sinh cosh tanh sqrt cbrt".split()}
+} | {name: f"np.{name}" for name in ["exp", "log", "sin", "cos", "tan", "sinh", "cosh", "tanh", "sqrt", "cbrt"]}
 CONSTANTS = {"pi": "np.pi", "E": "np.e"}
 
 
