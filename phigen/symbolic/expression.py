@@ -532,9 +532,7 @@ def text(e: Expression) -> str:
                 out = f"-{wrap(args[0], 2)}", 1
             case "mul":
                 if node.args[1].op == "pow" and node.args[1].value == -1:
-                    divisor = node.args[1].args[0]
-                    written = text(divisor)
-                    out = f"{wrap(args[0], 2)}/{written if divisor.op in ('symbol', 'number') else f'({written})'}", 2
+                    out = f"{wrap(args[0], 2)}/{args[1][0].removeprefix('1/')}", 2
                 else:
                     out = f"{wrap(args[0], 2)}*{wrap(args[1], 3)}", 2
             case "pow":
