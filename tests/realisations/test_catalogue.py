@@ -1,0 +1,111 @@
+"""Choosing a kind: by name, by shape, and what is said when none applies."""
+
+import os
+import subprocess
+import sys
+
+import pytest
+from geometry.building import system
+
+from phigen.errors import SpecError
+from phigen.realisations.catalogue import BUILDERS, PLANNED, realise
+from phigen.spec.model import BirealisationChoice
+from phigen.symbolic.expression import ONE, symbol
+
+
+@pytest.mark.parametrize(
+    ("coordinates", "poisson", "kind"),
+    [
+        ("q p", "{canonical: {q: [q], p: [p]}}", "constant"),
+        ("x y", "{brackets: {x: {y: 2}}}", "constant"),
+        ("x y", "{brackets: {x: {y: 3*x*y}}}", "log-canonical"),
+        ("x y z", "{brackets: {x: {y: z}}}", "cayley"),
+        ("x y", "{lie_algebra: {name: aff(1)}}", "cayley"),
+    ],
+)
+def test_auto_picks_by_shape_and_explains(coordinates, poisson, kind):
+    found = realise(system(coordinates, poisson))
+    assert found.kind == kind
+    assert found.explanation.startswith(f"auto picked {kind}, since π is ")
+    assert found.exact
+    assert found.symmetric
+    assert found.reference
+
+
+def test_auto_refuses_a_general_tensor_and_names_what_is_planned():
+    with pytest.raises(SpecError, match="not constant, not log-canonical and not linear") as caught:
+        realise(system("x y", "{brackets: {x: {y: 1 + x*y}}}"))
+    diagnostic = caught.value.diagnostics[0]
+    assert "karasev" in diagnostic.hint
+    assert diagnostic.location.line == 4  # of poisson, for lack of a birealisation
+
+
+@pytest.mark.parametrize("kind", PLANNED)
+def test_planned_kinds_are_refused_as_planned(kind):
+    with pytest.raises(SpecError, match=f"{kind} is planned"):
+        realise(system("x y", "{brackets: {x: {y: 1}}}"), BirealisationChoice(kind))
+
+
+def test_unknown_kind_lists_the_available_ones():
+    with pytest.raises(SpecError) as caught:
+        realise(system("x y", "{brackets: {x: {y: 1}}}"), BirealisationChoice("magic"))
+    assert all(kind in caught.value.diagnostics[0].hint for kind in BUILDERS)
+
+
+@pytest.mark.parametrize(
+    ("kind", "poisson"),
+    [
+        ("constant", "{brackets: {x: {y: x}}}"),
+        ("log-canonical", "{brackets: {x: {y: x}}}"),
+        ("canonical-euler", "{brackets: {x: {y: 2}}}"),
+        ("cayley", "{brackets: {x: {y: 2}}}"),
+    ],
+)
+def test_a_kind_that_does_not_fit_is_refused_with_the_shape_of_the_tensor(kind, poisson):
+    with pytest.raises(SpecError, match=f"birealisation {kind} needs"):
+        realise(system("x y", poisson), BirealisationChoice(kind))
+
+
+def test_custom_maps_of_the_wrong_size_or_with_unknown_symbols_are_refused():
+    s = system("x y", "{brackets: {x: {y: 2}}}")
+    x = symbol("x")
+    with pytest.raises(SpecError, match="alpha has 1 components"):
+        realise(s, BirealisationChoice("custom", (x,), (x, x)))
+    with pytest.raises(SpecError, match="beta uses p:z"):
+        realise(s, BirealisationChoice("custom", (x, x), (x, symbol("p:z"))))
+
+
+def test_custom_differences_do_not_cancel():
+    x, y, p, r = (symbol(n) for n in ("x", "y", "p:x", "p:y"))
+    s = system("x y", "{brackets: {x: {y: 1}}}")
+    found = realise(s, BirealisationChoice("custom", (x + r, ONE * y), (x, y - p)))
+    assert [str(d) for d in found.displacement] == ["p:y", "0"]
+    assert [str(d) for d in found.increment] == ["-p:y", "-p:x"]
+    assert not found.symmetric
+
+
+def test_constant_displacement_and_increment():
+    found = realise(system("q p", "{canonical: {q: [q], p: [p]}}"))
+    assert [str(d) for d in found.displacement] == ["(-1/2)*p:p", "1/2*p:q"]
+    assert [str(d) for d in found.increment] == ["p:p", "-p:q"]
+    assert found.covector == ("p:q", "p:p")
+
+
+def test_nothing_depends_on_the_hash_seed():
+    code = (
+        "from phigen.spec import load\nfrom phigen.resources import bundled_specs\n"
+        "from phigen.geometry.system import system_from_spec\nfrom phigen.geometry.checks import check\n"
+        "from phigen.realisations.catalogue import realise\nimport dataclasses\n"
+        "for name in ('toda3', 'rigid_body_dual', 'so4_manakov', 'lotka_volterra', 'gaussian_moments'):\n"
+        "    spec = dataclasses.replace(load(bundled_specs() / (name + '.yaml')), casimirs={})\n"
+        "    s = system_from_spec(spec)\n    r = realise(s)\n"
+        "    print([str(e) for e in (*r.alpha, *r.beta, *r.displacement, *r.increment, *s.casimirs.values())])\n"
+        "    print(*check(s), r.explanation)\n"
+    )
+    outputs = []
+    for seed in ("0", "1", "2"):
+        environment = os.environ | {"PYTHONHASHSEED": seed, "PYTHONPATH": os.pathsep.join(sys.path)}
+        run = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
+        outputs.append(run.stdout)
+    assert outputs[0] == outputs[1] == outputs[2]
+    assert len(outputs[0]) > 1000

@@ -1,0 +1,156 @@
+"""The Cayley transform: which algebras and representations are closed under P E P."""
+
+import pytest
+from geometry.building import family, system, typed
+
+from phigen.errors import SpecError
+from phigen.geometry.representations import candidates, indecomposable_parts
+from phigen.geometry.system import system_from_spec
+from phigen.realisations.axioms import check
+from phigen.realisations.catalogue import realise
+from phigen.realisations.cayley import closed_product
+from phigen.resources import bundled_specs
+from phigen.spec import load
+from phigen.spec.model import BirealisationChoice
+from phigen.symbolic.verdict import PROVED
+
+CAYLEY = BirealisationChoice("cayley")
+
+
+def proved(s):
+    return {statement.verdict for statement in check(s, realise(s, CAYLEY))} == {PROVED}
+
+
+def refusal(s) -> str:
+    with pytest.raises(SpecError) as caught:
+        realise(s, CAYLEY)
+    return str(caught.value)
+
+
+def test_sl3_is_refused_naming_the_element_that_leaves():
+    message = refusal(family("sl", 3))
+    # H_1² H_2 has a trace.
+    assert "in the 3×3 matrices of sl(3), E1·E1·E2 + E2·E1·E1 leaves the algebra" in message
+    assert "in the adjoint 8×8 matrices, E1·E1·E1 leaves the algebra" in message
+    assert "karasev" in message
+
+
+def test_su3_is_refused_and_su2_is_not():
+    assert "leaves the algebra" in refusal(family("su", 3))
+    assert proved(family("su", 2))
+
+
+def test_sl3_typed_as_a_matrix_is_refused_with_the_coordinates_names():
+    assert "x1·x1·x2 + x2·x1·x1 leaves" in refusal(typed(family("sl", 3)))
+
+
+def test_gl3_contains_sl3_but_is_closed():
+    assert proved(typed(family("gl", 3)))
+
+
+def test_toda_lattice_needs_the_characters_for_its_centre():
+    s = system_from_spec(load(bundled_specs() / "toda3.yaml"))
+    assert "nilpotent character" in realise(s).explanation
+    assert proved(s)
+
+
+@pytest.mark.parametrize("sites", [2, 4, 5])
+def test_toda_lattices_of_any_length(sites):
+    a = [f"a{i}" for i in range(1, sites)]
+    b = [f"b{i}" for i in range(1, sites + 1)]
+    rows = ", ".join(f"a{i}: {{b{i}: -a{i}, b{i + 1}: a{i}}}" for i in range(1, sites))
+    assert proved(system(" ".join(a + b), f"{{brackets: {{{rows}}}}}"))
+
+
+def test_lagrange_top_is_recognised_as_se3():
+    s = system_from_spec(load(bundled_specs() / "lagrange_top.yaml"))
+    assert "minus the 4×4 matrices of se(3)" in realise(s).explanation
+    # the chart is affine in the linear momentum part: α(G) − G has no term quadratic in p
+    assert [str(d).count("p:") for d in realise(s).displacement[3:]] == [2, 2, 2]
+
+
+def test_spin_chain_is_taken_apart_into_its_spins():
+    s = system_from_spec(load(bundled_specs() / "spin_chain5.yaml"))
+    assert indecomposable_parts(s.lie_algebra) == [[3 * i, 3 * i + 1, 3 * i + 2] for i in range(5)]
+    assert "(x1, y1, z1), (x2, y2, z2)" in realise(s).explanation
+
+
+def test_parts_may_be_interleaved_and_of_different_kinds():
+    # so(3) on (a, c, e), Heisenberg on (b, d, f), a Casimir g
+    s = system("a b c d e f g", "{brackets: {a: {c: e, e: -c}, c: {e: a}, b: {d: f}}}")
+    assert indecomposable_parts(s.lie_algebra) == [[0, 2, 4], [1, 3, 5], [6]]
+    assert proved(s)
+    assert realise(s).displacement[6].is_zero
+
+
+@pytest.mark.parametrize(
+    "brackets",
+    [
+        "{x: {y: -z/I3, z: y/I2}, y: {z: -x/I1}}",  # so(3) with moments of inertia
+        "{x: {y: I1*y + I2*z, z: I3*z}}",  # solvable, book algebra
+        "{x: {y: I1*z}}",  # Heisenberg, scaled
+        "{x: {y: 2*I1*y, z: -2*I1*z}, y: {z: x/I2}}",  # sl(2), scaled
+        "{x: {y: sqrt(I1)*z, z: -y}}",  # se(2) with a function of a parameter
+    ],
+)
+def test_algebras_with_parameters_in_their_constants(brackets):
+    assert proved(system("x y z", f"{{brackets: {brackets}}}", extra="parameters: {I1: 2, I2: 3, I3: 5}"))
+
+
+def test_two_step_nilpotent_algebras_need_no_family():
+    # free nilpotent of step two on three generators: its centre lies in [g, g]
+    s = system("a b c u v w", "{brackets: {a: {b: u, c: v}, b: {c: w}}}")
+    assert "two-step nilpotent" in realise(s).explanation
+    assert proved(s)
+
+
+def test_three_step_nilpotent_without_representation_is_refused_saying_so():
+    message = refusal(system("a b c d", "{brackets: {a: {b: c, c: d}}}"))
+    assert "no faithful representation" in message
+
+
+def test_given_matrices_come_first_and_are_used_as_they_are():
+    # sl(2) in its three-dimensional representation is not closed; the fallback finds the adjoint or 2×2 matrices.
+    three = "[[[2,0,0],[0,0,0],[0,0,-2]], [[0,1,0],[0,0,2],[0,0,0]], [[0,0,0],[2,0,0],[0,1,0]]]"
+    s = system("h e f", f"{{lie_algebra: {{matrices: {three}}}}}")
+    assert "given algebra" in realise(s).explanation or "sl(2)" in realise(s).explanation
+    assert proved(s)
+
+
+def test_linear_tensor_without_jacobi_identity_is_called_that():
+    message = refusal(system("x y z", "{brackets: {x: {y: z, z: x}, y: {z: y + x}}}"))
+    assert "Jacobi identity fails for (x, y, z)" in message
+
+
+def test_nonlinear_tensor_is_refused():
+    assert "needs a linear π" in refusal(system("x y", "{brackets: {x: {y: x*y}}}"))
+
+
+@pytest.mark.parametrize(("name", "size"), [("so", 4), ("gl", 2), ("se", 3), ("heisenberg", 2), ("aff", 1)])
+def test_all_candidates_are_faithful_representations(name, size):
+    from phigen.geometry.field import Field
+    from phigen.geometry.linear import Span, add_multiple
+    from phigen.geometry.matrix_algebras import product
+
+    algebra = typed(family(name, size)).lie_algebra
+    for representation in candidates(algebra):
+        field = Field(v for m in representation.matrices for v in m.values())
+        matrices = [{at: field.convert(v) for at, v in m.items()} for m in representation.matrices]
+        assert Span(field, matrices).dependent == []
+        for i in range(algebra.dimension):
+            for j in range(i):
+                difference = product(matrices[i], matrices[j])
+                add_multiple(difference, product(matrices[j], matrices[i]), -field.one)
+                for k, c in algebra.bracket(i, j).items():
+                    add_multiple(difference, matrices[k], -field.convert(c))
+                assert difference == {}
+
+
+def test_trilinear_form_of_so3_is_minus_the_scalar_product():
+    terms, _ = closed_product(family("so", 3).lie_algebra)
+    # P E_i P = −p_i P
+    assert {key: str(c) for key, c in terms.items() if key[0] == 0} == {
+        (0, 0, 0, 0): "-1",
+        (0, 0, 1, 1): "-1",
+        (0, 0, 2, 2): "-1",
+    }
