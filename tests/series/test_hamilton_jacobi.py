@@ -1,0 +1,269 @@
+"""The Hamilton–Jacobi series against closed forms, against sympy, and against itself."""
+
+import time
+from fractions import Fraction
+
+import mpmath
+import pytest
+import sympy
+from support import BODY, NAMES, SPECIES, compile_text, compiled, symbols, values
+
+from phigen.scheme.assemble import series_of
+from phigen.series.hamilton_jacobi import graph_series, polynomial_series, residual
+from phigen.symbolic.expression import ONE, PI, ZERO, Expression, call, number, power, sqrt, symbol
+from phigen.symbolic.tower import Tower
+
+q, p, a = symbols("q p p:q")
+b = symbol("p:p")
+HALF = number(Fraction(1, 2))
+MIDPOINT = (q - HALF * b, p + HALF * a)
+ONE_SIDED = (q, p + a)
+
+
+def series(compilation, terms, *, symmetric=True):
+    """S_1 … S_terms of a compilation, parity used or not."""
+    system = compilation.system
+    return polynomial_series(
+        system.hamiltonian,
+        compilation.realisation.alpha,
+        system.coordinates,
+        system.parameter_names,
+        terms,
+        symmetric=symmetric,
+    )
+
+
+def planar(hamiltonian, alpha, terms, *, symmetric=False):
+    """The series of a system in one pair (q, p)."""
+    return polynomial_series(hamiltonian, alpha, ("q", "p"), ("g",), terms, symmetric=symmetric)
+
+
+def same(found, index, expected):
+    """Whether S_index is the expression, exactly."""
+    tower = found.tower
+    return tower.is_zero(found.terms[index - 1] - tower.convert(expected))
+
+
+def tangent_coefficients(count):
+    """Coefficients of t, t³, t⁵, … in 2 tan(t/2)."""
+    t = sympy.Symbol("t")
+    poly = sympy.series(2 * sympy.tan(t / 2), t, 0, 2 * count).removeO()
+    return [Fraction(int(c.p), int(c.q)) for c in (poly.coeff(t, 2 * k + 1) for k in range(count))]
+
+
+# -- check values with closed forms
+
+
+def test_oscillator_in_the_midpoint_chart_is_a_tangent():
+    """S_t = 2 tan(t/2) H, so S_3 = (q² + p²)/24 and S_5 = (q² + p²)/240."""
+    energy = (q**2 + p**2) / 2
+    found = planar(energy, MIDPOINT, 9)
+    assert same(found, 3, (q**2 + p**2) / 24)
+    assert same(found, 5, (q**2 + p**2) / 240)
+    for k, c in enumerate(tangent_coefficients(5)):
+        assert same(found, 2 * k + 1, number(c) * energy)
+
+
+def test_linear_hamiltonian_on_so3_in_the_cayley_chart_is_a_tangent():
+    """S_t = (2/|a|) tan(t|a|/2) H for H = a·x, so S_3 = |a|² H/12."""
+    body = compile_text(BODY.replace("x1**2/2 + x2**2/4 + x3**2/6", "x1/2 - 3*x2 + 2*x3/7") + "order: 2\n")
+    energy, square = body.system.hamiltonian, Fraction(1, 4) + 9 + Fraction(4, 49)
+    found = series(body, 7, symmetric=False)
+    assert same(found, 3, number(square / 12) * energy)
+    for k, c in enumerate(tangent_coefficients(4)):
+        assert same(found, 2 * k + 1, number(c * square**k) * energy)
+
+
+def test_third_term_of_the_rigid_body():
+    found = series(compile_text(BODY + "order: 2\n"), 4, symmetric=False)
+    x1, x2, x3 = symbols("x1 x2 x3")
+    quartic = 216 * x1**4 + 171 * x1**2 * x2**2 + 120 * x1**2 * x3**2 + 27 * x2**4 + 33 * x2**2 * x3**2 + 8 * x3**4
+    assert same(found, 1, x1**2 / 2 + x2**2 / 4 + x3**2 / 6)
+    assert same(found, 3, quartic / 2592)
+    assert found.terms[1] == 0
+    assert found.terms[3] == 0
+
+
+def test_third_term_of_the_log_canonical_system_with_linear_hamiltonian():
+    found = series(compile_text(SPECIES + "order: 2\n"), 3, symmetric=False)
+    x1, x2, x3 = symbols("x1 x2 x3")
+    assert same(found, 3, (x1 + x2) * (x1 + x3) * (x2 + x3) / 24)
+
+
+def test_logarithmic_hamiltonian_of_a_log_canonical_system_is_its_own_series():
+    """S_t = tH for H = Σ c_i log x_i, since α only multiplies the coordinates by constants."""
+    text = SPECIES.replace("x1 + x2 + x3", "3*log(x1) - log(x2)/2 + 5*log(x3)")
+    found = series(compile_text(text + "order: 2\n"), 4, symmetric=False)
+    assert all(found.tower.is_zero(term) for term in found.terms[1:])
+
+
+# -- structure
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_even_terms_vanish_in_symmetric_realisations(name):
+    """The parity theorem, with a series computed without using it."""
+    compilation = compiled(name)
+    if not compilation.realisation.symmetric:
+        pytest.skip("this bi-realisation is not symmetric")
+    found = series(compilation, 4, symmetric=False)
+    assert found.tower.is_zero(found.terms[1])
+    assert found.tower.is_zero(found.terms[3])
+
+
+def test_even_terms_of_a_one_sided_realisation_do_not_vanish():
+    assert planar((q**2 + p**2) / 2, ONE_SIDED, 2).terms[1] != 0
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_series_solves_the_equation(name):
+    compilation = compiled(name)
+    found = series(compilation, min(compilation.order.terms, 5), symmetric=compilation.realisation.symmetric)
+    rest = residual(
+        found, compilation.system.hamiltonian, compilation.realisation.alpha, compilation.system.coordinates
+    )
+    assert all(found.tower.is_zero(r) for r in rest)
+
+
+def test_residual_of_a_wrong_series_does_not_vanish():
+    found = planar((q**2 + p**2) / 2, MIDPOINT, 3)
+    wrong = type(found)(found.tower, (*found.terms[:2], 2 * found.terms[2]))
+    assert residual(wrong, (q**2 + p**2) / 2, MIDPOINT, ("q", "p"))[2] != 0
+
+
+def point_of(compilation):
+    """Numbers for the coordinates (those of the first run, moved a little) and the parameters."""
+    run = next(iter(compilation.spec.runs.values()))
+    numbers = {p.name: p.value for p in compilation.spec.parameters} | dict(run.parameters)
+    moved = [Fraction(v) + Fraction(k + 3, 97) for k, v in enumerate(run.initial)]
+    numbers |= dict(zip(compilation.system.coordinates, moved, strict=True))
+    return {k: mpmath.mpf(v.numerator) / v.denominator for k, v in numbers.items()}
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_polynomials_and_graphs_give_the_same_series(name):
+    compilation = compiled(name)
+    system, realisation = compilation.system, compilation.realisation
+    terms = min(compilation.order.terms, 5)
+    symmetric = realisation.symmetric
+    graph = graph_series(system.hamiltonian, realisation.alpha, system.coordinates, terms, symmetric=symmetric)
+    found = series(compilation, terms, symmetric=symmetric)
+    with mpmath.workdps(40):
+        at = point_of(compilation)
+        left = values(graph, at)
+        right = values([found.tower.expression(t) for t in found.terms], at)
+        assert all(abs(x - y) <= mpmath.mpf(10) ** -30 * (1 + abs(x)) for x, y in zip(left, right, strict=True))
+
+
+# -- functions beyond polynomials
+
+HAMILTONIANS = [
+    "exp(q - p)*(1 + q**2)",
+    "log(1 + q**2 + p)",
+    "p**2/2 - cos(q)*p + sin(q)",
+    "sqrt(q**2 + p**2 + 1)",
+    "p**2/2 - 1/q",
+    "1/(q*p + q**2)",
+    "q**(5/3)*p - p**(3/2)",
+    "(q + p**2)**(-3/2)",
+    "tan(q/3)*p**2",
+    "atan2(p, q)*q",
+    "abs(q - p)*q**2",
+    "q**g*p + p**2",
+    "(q + p)**(g*q)",
+    "asin(q/5)*p + acos(p/5)*q + atan(q*p)",
+    "sinh(q)*p + cosh(p/2) + tanh(q*p)",
+    "asinh(q)*p**2 + acosh(2 + p)*q + atanh(q*p/9)",
+    "exp(sin(q)*sqrt(p + 2))",
+    "pi*q**2*p + E*cos(p*q)",
+]
+
+VALUES = {"q": Fraction(5, 7), "p": Fraction(9, 8), "g": Fraction(4, 3)}
+
+
+def parsed(text):
+    """The text as a Hamiltonian of a spec."""
+    return compile_text(
+        f"coordinates: [q, p]\nparameters: {{g: 1.5}}\npoisson: {{canonical: {{q: [q], p: [p]}}}}\n"
+        f"hamiltonian: {text}\norder: 2\n"
+    ).system.hamiltonian
+
+
+def by_sympy(text, one_sided, terms):
+    """Values of S_1 … S_terms as text, the recursion done by sympy's own calculus."""
+    names = {n: sympy.Symbol(n, positive=True) for n in ("q", "p", "g", "t")}
+    sq, sp, t = names["q"], names["p"], names["t"]
+    energy = sympy.sympify(text, locals={**names, "abs": sympy.Abs}, rational=True)
+    found = [energy]
+    for i in range(1, terms):
+        partial = sum((t ** (k + 1) * s for k, s in enumerate(found)), sympy.Integer(0))
+        slope_q, slope_p = partial.diff(sq), partial.diff(sp)
+        half = sympy.Rational(1, 2)
+        moved = (sq, sp + slope_q) if one_sided else (sq - half * slope_p, sp + half * slope_q)
+        inside = energy.subs({sq: moved[0], sp: moved[1]}, simultaneous=True)
+        found.append(inside.diff(t, i).subs(t, 0) / sympy.factorial(i) / (i + 1))
+    at = {names[k]: sympy.Rational(v.numerator, v.denominator) for k, v in VALUES.items()}
+    return [str(sympy.N(s.subs(at), 32)) for s in found]
+
+
+@pytest.mark.parametrize("text", HAMILTONIANS)
+@pytest.mark.parametrize("one_sided", [True, False], ids=["one-sided", "midpoint"])
+def test_series_of_other_functions_agrees_with_sympy(text, one_sided):
+    expected = by_sympy(text, one_sided, 3)
+    energy, alpha = parsed(text), ONE_SIDED if one_sided else MIDPOINT
+    with mpmath.workdps(30):
+        at = {k: mpmath.mpf(v.numerator) / v.denominator for k, v in VALUES.items()}
+        found = planar(energy, alpha, 3)
+        in_tower = values([found.tower.expression(t) for t in found.terms], at)
+        as_graph = values(graph_series(energy, alpha, ("q", "p"), 3, symmetric=False), at)
+        for i, value in enumerate(map(mpmath.mpf, expected)):
+            bound = mpmath.mpf(10) ** -25 * (1 + abs(value))
+            assert abs(in_tower[i] - value) < bound, f"S_{i + 1} in the tower"
+            assert abs(as_graph[i] - value) < bound, f"S_{i + 1} as a graph"
+
+
+FREE_OF_MOMENTUM = [
+    (call("exp", q), lambda x: mpmath.exp(x)),
+    (call("log", q), lambda x: mpmath.log(x)),
+    (sqrt(q), lambda x: mpmath.sqrt(x)),
+    (1 / q, lambda x: 1 / x),
+    (power(q, Fraction(-7, 3)), lambda x: mpmath.power(x, mpmath.mpf(-7) / 3)),
+    (call("tan", q) * PI, lambda x: mpmath.tan(x) * mpmath.pi),
+    (call("atan2", q, ONE), lambda x: mpmath.atan2(x, 1)),
+    (call("abs", q) * q, lambda x: abs(x) * x),
+]
+
+
+@pytest.mark.parametrize(("function", "exact"), FREE_OF_MOMENTUM, ids=[str(f) for f, _ in FREE_OF_MOMENTUM])
+def test_series_of_a_shift_is_a_taylor_expansion(function, exact):
+    """For H = f(q) + p in the one-sided chart α = (q, p + a): S_t = (F(q + t) − F(q)) + tp, so S_i = f^(i−1)(q)/i!."""
+    found = planar(function + p, ONE_SIDED, 7)
+    with mpmath.workdps(50):
+        at = {"q": mpmath.mpf(13) / 11, "p": mpmath.mpf(2), "g": mpmath.mpf(1)}
+        computed = values([found.tower.expression(t) for t in found.terms], at)
+        expansion = mpmath.taylor(exact, at["q"], 6)
+        expected = [c / (i + 1) for i, c in enumerate(expansion)]
+        expected[0] += at["p"]
+        assert all(abs(x - y) < mpmath.mpf(10) ** -18 * (1 + abs(y)) for x, y in zip(computed, expected, strict=True))
+
+
+# -- cost
+
+
+def test_order_twelve_of_the_rigid_body_is_quick():
+    compilation = compiled("rigid_body")
+    start = time.perf_counter()
+    found = series_of(compilation.system, compilation.realisation, 11)
+    assert time.perf_counter() - start < 30  # a matter of a second; expression trees would take minutes
+    assert found.terms[10].total_degree() > 0
+    assert all(term == 0 for term in found.terms[1::2])
+
+
+@pytest.mark.parametrize("terms", [1, 2, 5])
+def test_as_many_terms_as_were_asked_for(terms):
+    found = planar((q**2 + p**2) / 2, MIDPOINT, terms, symmetric=True)
+    assert len(found.terms) == terms
+    assert isinstance(found.tower, Tower)
+    graph = graph_series((q**2 + p**2) / 2, MIDPOINT, ("q", "p"), terms, symmetric=True)
+    assert all(isinstance(term, Expression) for term in graph)
+    assert all(term is ZERO for term in graph[1::2])

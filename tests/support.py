@@ -1,0 +1,337 @@
+"""What several tests share: the corpus compiled, solvers of it, and an independent one-step map in many digits."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cache, lru_cache
+from typing import Any
+
+import mpmath
+import numpy as np
+
+from phigen import resources, spec
+from phigen.compiler import Compilation, compile_spec, emit
+from phigen.runtime import cache as library_cache
+from phigen.runtime.c_solver import CSolver
+from phigen.runtime.interface import Interface
+from phigen.runtime.numpy_solver import NumpySolver
+from phigen.runtime.solver import Solver
+from phigen.series.hamilton_jacobi import graph_series
+from phigen.spec.model import Run
+from phigen.symbolic.expression import Expression, derivatives, fold, gradient, number, symbol, total
+from phigen.symbolic.numeric import evaluate_with_scale
+
+#: The corpus.
+NAMES = sorted(path.stem for path in resources.bundled_specs().glob("*.yaml"))
+TARGETS = ("c", "numpy")
+COMMAND = "phigen build"
+DIGITS = 50
+
+
+def compile_text(text: str, order: int | None = None) -> Compilation:
+    """The compilation of a spec given as YAML without its first two keys."""
+    return compile_spec(spec.loads(f"phigen: 1\nname: t\n{text}"), order=order)
+
+
+@cache
+def compiled(name: str, order: int | None = None) -> Compilation:
+    """The compilation of a system of the corpus."""
+    return compile_spec(spec.load(resources.bundled_specs() / f"{name}.yaml"), order=order)
+
+
+@lru_cache(maxsize=256)
+def files(compilation: Compilation, target: str) -> Mapping[str, str]:
+    """The generated files."""
+    return emit(compilation.program, target, COMMAND)
+
+
+def interface(compilation: Compilation) -> Interface:
+    """The names that the runtime needs."""
+    program = compilation.program
+    return Interface(
+        program.name,
+        program.coordinates,
+        program.order,
+        {p.name: float(p.value) for p in program.parameters},
+        frozenset(p.name for p in program.parameters if p.positive),
+        program.casimirs,
+    )
+
+
+@lru_cache(maxsize=256)
+def solver(compilation: Compilation, target: str) -> Solver:
+    """A solver of one target; compiled C comes from the cache."""
+    names = interface(compilation)
+    if target == "c":
+        return Solver(CSolver.compile(files(compilation, "c"), names), names)
+    return Solver(NumpySolver.from_source(files(compilation, "numpy")[f"{names.name}.py"], names), names)
+
+
+def first_run(compilation: Compilation) -> Run:
+    """The first run of a spec."""
+    return next(iter(compilation.spec.runs.values()))
+
+
+@dataclass(frozen=True)
+class Setting:
+    """The numbers of a run: state, step size, parameters (all of them)."""
+
+    x: tuple[float, ...]
+    h: float
+    parameters: Mapping[str, float]
+
+
+def setting(compilation: Compilation, run: Run | None = None) -> Setting:
+    """The numbers of a run of the spec, the first unless another is given."""
+    run = run or first_run(compilation)
+    defaults = {p.name: float(p.value) for p in compilation.spec.parameters}
+    return Setting(
+        tuple(float(v) for v in run.initial),
+        float(run.step),
+        {**defaults, **{k: float(v) for k, v in run.parameters.items()}},
+    )
+
+
+def casimir_scales(compilation: Compilation, at: Setting) -> list[float]:
+    """The size of each Casimir at a state: the largest term that occurs in it, at least its value."""
+    values = _fractions(compilation.spec.coordinates, at)
+    pairs = evaluate_with_scale(list(compilation.system.casimirs.values()), values, 30)
+    return [max(abs(float(value)), 1e-300) for value, _ in pairs]
+
+
+def _fractions(coordinates: Sequence[str], at: Setting) -> dict[str, Fraction]:
+    return {k: Fraction(v) for k, v in [*zip(coordinates, at.x, strict=True), *at.parameters.items()]}
+
+
+# -- the struct of the C solver, looked at from outside ------------------------------------------------------------
+
+
+class RawC:
+    """A generated C library called as a C program would, with a view of ``x`` and ``carry`` in the solver's struct."""
+
+    def __init__(self, compilation: Compilation) -> None:
+        self.name, self.n = compilation.program.name, compilation.program.dimension
+        self._library = library_cache.load(files(compilation, "c"))
+        self._parameters = [p.name for p in compilation.program.parameters]
+        self.memory = np.zeros(self.call("solver_size", ctypes.c_size_t), dtype=np.uint8)
+        doubles = self.memory[: 16 * self.n].view(np.float64)
+        self.x, self.carry = doubles[: self.n], doubles[self.n :]
+        counters = self.memory[16 * self.n :][: 2 * ctypes.sizeof(ctypes.c_size_t)].view(np.uintp)
+        self.counters = counters  # steps, evaluations
+
+    def call(self, function: str, result: Any, *args: Any) -> Any:
+        """Call ``NAME_function`` with arguments that are ctypes objects already."""
+        f = getattr(self._library, f"{self.name}_{function}")
+        f.restype = result
+        return f(*args)
+
+    @property
+    def here(self) -> ctypes.c_void_p:
+        """The address of the struct."""
+        return ctypes.c_void_p(self.memory.ctypes.data)
+
+    def init(self, x0: Sequence[float], parameters: Mapping[str, float] | None = None) -> int:
+        """``NAME_init``; parameters None passes a null pointer."""
+        start = np.array(x0, dtype=float)
+        packed = None
+        if parameters is not None:
+            array = np.array([parameters[p] for p in self._parameters] or [0.0])
+            packed = ctypes.c_void_p(array.ctypes.data)
+        return self.call("init", ctypes.c_int, self.here, packed, ctypes.c_void_p(start.ctypes.data))
+
+    def step(self, h: float) -> int:
+        """``NAME_step``."""
+        return self.call("step", ctypes.c_int, self.here, ctypes.c_double(h))
+
+    def integrate(self, h: float, steps: int) -> int:
+        """``NAME_integrate``."""
+        return self.call("integrate", ctypes.c_int, self.here, ctypes.c_double(h), ctypes.c_size_t(steps))
+
+    @property
+    def exact_state(self) -> list[Any]:
+        """x + carry, in many digits."""
+        return [mpmath.mpf(float(x)) + mpmath.mpf(float(c)) for x, c in zip(self.x, self.carry, strict=True)]
+
+
+# -- the scheme in many digits, without anything of phigen.scheme and phigen.targets --------------------------------
+
+
+def precisely(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Run with `DIGITS` digits of mpmath."""
+
+    def wrapped(*args: Any, **kwargs: Any) -> Any:
+        with mpmath.workdps(DIGITS):
+            return function(*args, **kwargs)
+
+    wrapped.__name__, wrapped.__doc__ = function.__name__, function.__doc__
+    return wrapped
+
+
+def values(roots: Sequence[Expression], at: Mapping[str, Any]) -> list[Any]:
+    """Values of expressions as mpmath numbers of the current precision, by rules of its own."""
+    return fold(roots, lambda e, args: _value(e, args, at))
+
+
+def _value(e: Expression, args: list[Any], at: Mapping[str, Any]) -> Any:
+    match e.op:
+        case "number":
+            return mpmath.mpf(e.value.numerator) / e.value.denominator
+        case "symbol":
+            return mpmath.mpf(at[e.value])
+        case "pi":
+            return +mpmath.pi
+        case "E":
+            return +mpmath.e
+        case "add":
+            return args[0] + args[1]
+        case "sub":
+            return args[0] - args[1]
+        case "neg":
+            return -args[0]
+        case "mul":
+            return args[0] * args[1]
+        case "pow":
+            if e.value.denominator == 1:
+                return args[0] ** int(e.value)
+            return mpmath.power(args[0], mpmath.mpf(e.value.numerator) / e.value.denominator)
+        case "power":
+            return mpmath.power(*args)
+        case "abs":
+            return abs(args[0])
+        case "sign":
+            return mpmath.sign(args[0])
+    return getattr(mpmath, e.op)(*args)
+
+
+class PreciseStep:
+    """One step of the scheme in many digits: Newton's method on α(y, ∇S_h(y)) = x, then x' = β(y, ∇S_h(y)).
+
+    Made from the bi-realisation and the graph series alone. ``tangent`` gives DΦ by implicit differentiation.
+    """
+
+    def __init__(self, compilation: Compilation, parameters: Mapping[str, float], h: float) -> None:
+        realisation, system = compilation.realisation, compilation.system
+        self.coordinates = system.coordinates
+        self.n = len(self.coordinates)
+        terms = graph_series(
+            system.hamiltonian,
+            realisation.alpha,
+            self.coordinates,
+            compilation.order.terms,
+            symmetric=realisation.symmetric,
+        )
+        s = total(number(Fraction(h)) ** (i + 1) * term for i, term in enumerate(terms))
+        slope = gradient(s, self.coordinates)
+        hessian = [d for c in self.coordinates for d in derivatives(slope, c)]  # column by column
+        self._momenta = [*slope, *hessian]
+        both = [*realisation.alpha, *realisation.beta]
+        names = [*self.coordinates, *realisation.covector]
+        self._maps = [*both, *(d for name in names for d in derivatives(both, name))]
+        self._covector = realisation.covector
+        self._poisson = [e for row in system.poisson for e in row]
+        self._field = system.vector_field()
+        self._parameters = dict(parameters)
+
+    def _linearised(self, y: Sequence[Any]) -> tuple[Any, Any, Any, Any]:
+        n, at = self.n, {**self._parameters, **dict(zip(self.coordinates, y, strict=True))}
+        momenta = values(self._momenta, at)
+        hessian = _columns(momenta[n:], n, n)
+        maps = values(self._maps, {**at, **dict(zip(self._covector, momenta[:n], strict=True))})
+        by_x, by_p = _columns(maps[2 * n :][: 2 * n * n], 2 * n, n), _columns(maps[2 * n :][2 * n * n :], 2 * n, n)
+        total_derivative = by_x + by_p * hessian
+        alpha, beta = mpmath.matrix(maps[:n]), mpmath.matrix(maps[n : 2 * n])
+        return alpha, beta, total_derivative[:n, :], total_derivative[n:, :]
+
+    @precisely
+    def solve(self, x: Sequence[Any]) -> tuple[list[Any], Any]:
+        """Φ(x) and DΦ(x)."""
+        y, x = mpmath.matrix(list(x)), mpmath.matrix(list(x))
+        for _ in range(60):
+            alpha, beta, d_alpha, d_beta = self._linearised(list(y))
+            delta = mpmath.lu_solve(d_alpha, alpha - x)
+            if mpmath.norm(delta, mpmath.inf) <= mpmath.norm(y, mpmath.inf) * mpmath.mpf(10) ** (4 - DIGITS):
+                return list(beta), d_beta * mpmath.inverse(d_alpha)
+            y -= delta
+        raise ArithmeticError("no convergence")
+
+    def __call__(self, x: Sequence[Any]) -> list[Any]:
+        """Φ(x)."""
+        return self.solve(x)[0]
+
+    def poisson(self, x: Sequence[Any]) -> Any:
+        """The matrix π(x)."""
+        at = {**self._parameters, **dict(zip(self.coordinates, x, strict=True))}
+        return _columns(values(self._poisson, at), self.n, self.n).T
+
+    @precisely
+    def defect(self, x: Sequence[Any]) -> float:
+        """|DΦ π DΦᵀ − π∘Φ| relative to |π∘Φ| at x."""
+        image, tangent = self.solve(x)
+        return relative_defect(tangent, self.poisson(x), self.poisson(image))
+
+
+def _columns(entries: Sequence[Any], rows: int, columns: int) -> Any:
+    matrix = mpmath.matrix(rows, columns)
+    for k, e in enumerate(entries):
+        matrix[k % rows, k // rows] = e
+    return matrix
+
+
+def relative_defect(tangent: Any, before: Any, after: Any) -> float:
+    """|T π(x) Tᵀ − π(x')| relative to |π(x')|."""
+    return float(_largest(tangent * before * tangent.T - after) / _largest(after))
+
+
+def _largest(matrix: Any) -> Any:
+    return max(abs(e) for e in matrix)
+
+
+@precisely
+def tangent_by_differences(step: Callable[[Sequence[Any]], Sequence[Any]], x: Sequence[Any]) -> Any:
+    """The derivative of a map given in many digits, by central differences: good to a third of the digits or more."""
+    n, width = len(x), mpmath.mpf(10) ** (-DIGITS // 3)
+    tangent = mpmath.matrix(n, n)
+    for j in range(n):
+        ends = []
+        for sign in (1, -1):
+            moved = [mpmath.mpf(v) for v in x]
+            moved[j] += sign * width
+            ends.append(step(moved))
+        for i in range(n):
+            tangent[i, j] = (ends[0][i] - ends[1][i]) / (2 * width)
+    return tangent
+
+
+@precisely
+def defect_of_map(
+    step: Callable[[Sequence[Any]], Sequence[Any]], poisson: Callable[[Sequence[Any]], Any], x: Sequence[Any]
+) -> float:
+    """|DΦ π DΦᵀ − π∘Φ| relative to |π∘Φ| of any map, by differences in many digits."""
+    return relative_defect(tangent_by_differences(step, x), poisson(x), poisson(step(x)))
+
+
+# -- systems beside the corpus --------------------------------------------------------------------------------------
+
+BODY = """coordinates: [x1, x2, x3]
+poisson: {brackets: {x1: {x2: -x3, x3: x2}, x2: {x3: -x1}}}
+hamiltonian: x1**2/2 + x2**2/4 + x3**2/6
+"""
+
+SPECIES = """coordinates: [x1, x2, x3]
+poisson: {log_canonical: [[0, 1, 1], [-1, 0, 1], [-1, -1, 0]]}
+hamiltonian: x1 + x2 + x3
+"""
+
+
+def symbols(names: str) -> list[Expression]:
+    """Symbols from names separated by spaces."""
+    return [symbol(n) for n in names.split()]
+
+
+def in_ci() -> bool:
+    """Whether nothing may be skipped for want of a tool."""
+    return bool(os.environ.get("CI"))
