@@ -12,13 +12,15 @@ from typing import TYPE_CHECKING, Any
 from phigen._version import __version__
 
 if TYPE_CHECKING:
+    from phigen.api import compile, load
     from phigen.errors import CheckError, LimitError, PhigenError, SpecError, StepError, ToolchainError
+    from phigen.geometry.system import System
     from phigen.runtime.solver import Solver
     from phigen.runtime.trajectory import Trajectory
 
 _HOMES = {
-    "load": "phigen.compiler",
-    "compile": "phigen.compiler",
+    "load": "phigen.api",
+    "compile": "phigen.api",
     "System": "phigen.geometry.system",
     "Solver": "phigen.runtime.solver",
     "Trajectory": "phigen.runtime.trajectory",

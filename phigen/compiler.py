@@ -37,9 +37,10 @@ class Compilation:
     seconds: Mapping[str, float] = field(default_factory=dict)
 
 
-def compile_spec(spec: Spec, *, order: int | None = None) -> Compilation:
+def compile_spec(spec: Spec, *, order: int | None = None, system: System | None = None) -> Compilation:
     """Compile a spec; ``order`` overrides the order (and the terms) that it asks for.
 
+    ``system`` is its system, where the caller has built it already.
     Raises `SpecError` (no bi-realisation applies, …) and `LimitError` (the program would be too large).
     """
     seconds: dict[str, float] = {}
@@ -50,13 +51,13 @@ def compile_spec(spec: Spec, *, order: int | None = None) -> Compilation:
         seconds[stage] = time.perf_counter() - start
         return result
 
-    system = timed("system", lambda: system_from_spec(spec))
-    realisation = timed("bi-realisation", lambda: realise(system, spec.birealisation))
+    source = timed("system", lambda: system or system_from_spec(spec))
+    realisation = timed("bi-realisation", lambda: realise(source, spec.birealisation))
     plan = plan_order(order or spec.order, None if order else spec.terms, symmetric=realisation.symmetric)
     program = timed(
         "program",
         lambda: build_program(
-            system,
+            source,
             realisation,
             plan,
             solver=spec.solver,
@@ -65,7 +66,7 @@ def compile_spec(spec: Spec, *, order: int | None = None) -> Compilation:
             spec_sha256=spec.source_sha256,
         ),
     )
-    return Compilation(spec, system, realisation, plan, program, seconds)
+    return Compilation(spec, source, realisation, plan, program, seconds)
 
 
 def compile_file(path: str | Path, *, order: int | None = None) -> Compilation:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from phigen.errors import Diagnostic, Location, SpecError
@@ -22,7 +22,8 @@ class System:
     ``poisson`` is the n×n matrix π_ij = {x_i, x_j}; expressions use the coordinates and parameters as
     symbols. ``casimirs`` holds the declared ones first, in the order of the spec, then the found ones
     (``C1``, ``C2``, …; ``declared`` has the names of the former). ``shape`` is what π was recognised as,
-    ``form`` what the spec said. ``notes`` says what was not searched for, and why.
+    ``form`` what the spec said. ``notes`` says what was not searched for, and why. ``spec`` is where it comes
+    from, None for a system built in Python.
     """
 
     name: str
@@ -37,6 +38,7 @@ class System:
     declared: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     locations: Mapping[tuple[Any, ...], Location] = field(default_factory=dict)
+    spec: Spec | None = field(default=None, repr=False, compare=False)
 
     @property
     def dimension(self) -> int:
@@ -92,7 +94,7 @@ def system_from_spec(spec: Spec) -> System:
     Raises `SpecError` for matrices that do not span a Lie algebra, structure constants without Jacobi
     identity, and sizes that do not match the number of coordinates.
     """
-    return build_system(
+    system = build_system(
         spec.name,
         spec.coordinates,
         spec.parameters,
@@ -102,6 +104,7 @@ def system_from_spec(spec: Spec) -> System:
         invariants=spec.invariants,
         locations=spec.locations,
     )
+    return replace(system, spec=spec)
 
 
 def build_system(

@@ -1,0 +1,156 @@
+"""Everything phigen proves about one spec, in groups; and compiling with those proofs as a condition."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+
+from phigen.compiler import Compilation, compile_spec
+from phigen.errors import CheckError, Diagnostic, LimitError, SpecError
+from phigen.geometry import checks
+from phigen.geometry.jacobi import jacobi_identity
+from phigen.geometry.system import System, system_from_spec
+from phigen.realisations import axioms
+from phigen.scheme.assemble import series_of
+from phigen.series.hamilton_jacobi import residual
+from phigen.spec.model import Spec
+from phigen.symbolic.verdict import REFUTED, Statement, decide_elements
+
+#: Statements by the part of the mathematics they belong to, in the order of the pipeline.
+Groups = Mapping[str, tuple[Statement, ...]]
+
+PREFIX = "bi-realisation: "
+
+
+@dataclass(frozen=True)
+class Examination:
+    """What was proved about a spec.
+
+    ``compilation`` is None if there is none: ``obstacle`` then says why. An obstacle is no refutation: no
+    bi-realisation of the catalogue may apply to a perfectly good Poisson tensor.
+    """
+
+    spec: Spec
+    groups: Groups
+    compilation: Compilation | None = None
+    obstacle: SpecError | None = None
+    seconds: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def statements(self) -> list[Statement]:
+        """All statements, in order."""
+        return [s for group in self.groups.values() for s in group]
+
+    @property
+    def refuted(self) -> list[Statement]:
+        """The statements that are false."""
+        return [s for s in self.statements if s.verdict == REFUTED]
+
+
+def examine(spec: Spec, *, order: int | None = None, system: System | None = None) -> Examination:
+    """Prove what can be proved about a spec, as far along the pipeline as it gets.
+
+    Raises `SpecError` if the spec does not even define a system.
+    """
+    start = time.perf_counter()
+    try:
+        system = system or system_from_spec(spec)
+    except SpecError as error:
+        raise located(error, spec) from None
+    built = time.perf_counter()
+    groups = _geometry(system)
+    try:
+        compilation = compile_spec(spec, order=order, system=system)
+    except SpecError as error:
+        return Examination(spec, groups, obstacle=located(error, spec))
+    groups = {**groups, **_method(compilation)}
+    compiling = sum(compilation.seconds.values())
+    proofs = time.perf_counter() - built - compiling
+    seconds = {**compilation.seconds, "system": built - start, "proofs": proofs}
+    return Examination(spec, groups, compilation, seconds=seconds)
+
+
+def compile_proved(spec: Spec, *, order: int | None = None, system: System | None = None) -> Compilation:
+    """`compile_spec`, refusing what is refuted.
+
+    Raises `CheckError` that names what is refuted, with the residual: no π that is not Poisson, no claimed Casimir
+    that is none, no wrong bi-realisation reaches the output. Raises `SpecError` and `LimitError` as `compile_spec`.
+    """
+    found = examine(spec, order=order, system=system)
+    if found.refuted:
+        raise CheckError(refutation(found))
+    if found.compilation is None:
+        raise found.obstacle or AssertionError("an examination without compilation has an obstacle")
+    return replace(found.compilation, seconds=found.seconds)
+
+
+def refutation(found: Examination) -> str:
+    """What is refuted, for a message, each with its place in the spec."""
+    return "\n".join(_placed(found.spec, s) for s in found.refuted)
+
+
+def _placed(spec: Spec, statement: Statement) -> str:
+    names = {f"{name} is a Casimir": ("casimirs", name) for name in spec.casimirs}
+    names |= {f"{name} is invariant": ("invariants", name) for name in spec.invariants}
+    default = ("birealisation",) if statement.name.startswith(PREFIX) else ("poisson",)
+    return str(spec.diagnostic(names.get(statement.name, default), str(statement)))
+
+
+def _geometry(system: System) -> Groups:
+    groups: dict[str, tuple[Statement, ...]] = {
+        "Poisson tensor": (checks.skew_symmetry(system), jacobi_identity(system)),
+        "Casimirs": (*checks.casimir_statements(system), checks.rank_statement(system)),
+    }
+    invariants = tuple(checks.invariant_statements(system))
+    return groups | ({"Invariants": invariants} if invariants else {})
+
+
+def _method(compilation: Compilation) -> Groups:
+    stripped = [
+        replace(s, name=s.name.removeprefix(PREFIX)) for s in axioms.check(compilation.system, compilation.realisation)
+    ]
+    label = f"Bi-realisation ({compilation.realisation.kind})"
+    return {label: tuple(stripped), "Hamilton–Jacobi series": tuple(series_statements(compilation))}
+
+
+def series_statements(compilation: Compilation) -> Iterator[Statement]:
+    """S_1 … S_k solve the Hamilton–Jacobi equation; the S_i of even index vanish where the order rests on it."""
+    system, realisation, terms = compilation.system, compilation.realisation, compilation.order.terms
+    further = 1 if realisation.symmetric else 0  # S_{k+1} = 0 is what makes the order k + 1
+    series = series_of(system, realisation, terms + further)
+    rest = residual(series, system.hamiltonian, realisation.alpha, system.coordinates)
+    listed = [(f"coefficient of t^{i}", r) for i, r in enumerate(rest)]
+    name = f"∂_t S_t = H(α(x, ∇S_t)) for S_t = {sum_of_terms(terms)}"
+    yield decide_elements(name, series.tower, listed[:terms], system.positive, f"up to t^{terms - 1}")
+    if realisation.symmetric:
+        even = ", ".join(f"S_{i}" for i in range(2, terms + further + 1, 2))
+        found = [entry for i, entry in enumerate(listed) if i % 2]
+        yield decide_elements(
+            f"{even} = 0", series.tower, found, system.positive, f"hence the order {compilation.order.order}"
+        )
+
+
+def sum_of_terms(terms: int) -> str:
+    """``t S_1 + … + t^5 S_5``."""
+    shown = ["t S_1", *(f"t^{i} S_{i}" for i in range(2, terms + 1))]
+    return " + ".join(shown if terms < 4 else [shown[0], "…", shown[-1]])
+
+
+def merged(errors: Iterable[SpecError]) -> SpecError:
+    """One error with all diagnostics; a `LimitError` if one of them is."""
+    listed = list(errors)
+    kind = LimitError if any(isinstance(e, LimitError) for e in listed) else SpecError
+    return kind([d for e in listed for d in e.diagnostics])
+
+
+def located(error: SpecError, spec: Spec) -> SpecError:
+    """The error with the line of the spec that each diagnostic is about."""
+    lines = spec.source.split("\n")
+
+    def shown(d: Diagnostic) -> Diagnostic:
+        if d.source_line or not d.location or d.location.line > len(lines):
+            return d
+        return replace(d, source_line=lines[d.location.line - 1])
+
+    return type(error)([shown(d) for d in error.diagnostics])

@@ -1,0 +1,122 @@
+"""The Python API: `load` a system, `compile` it to a solver.
+
+import phigen
+system = phigen.load("rigid_body.yaml")
+solver = phigen.compile(system, target="c", order=4)
+trajectory = solver.integrate([1, 1, 1], h=0.05, steps=20_000, stride=10, I2=2.5)
+"""
+
+from __future__ import annotations
+
+from os import PathLike
+from typing import TYPE_CHECKING
+
+from phigen import spec as specs
+from phigen.analysis.proof import compile_proved, located
+from phigen.compiler import Compilation, emit
+from phigen.errors import SpecError, ToolchainError
+from phigen.geometry.system import System, system_from_spec
+from phigen.spec import limits
+from phigen.spec.model import Spec
+
+if TYPE_CHECKING:
+    from phigen.runtime.solver import Solver
+
+#: What `compile` takes.
+Source = str | PathLike[str] | Spec | System | Compilation
+
+TARGETS = ("auto", "c", "numpy")
+
+
+def load(path: str | PathLike[str]) -> System:
+    """The system in a spec file; its ``spec`` holds the rest of the file (order, runs, title, …).
+
+    Raises `SpecError` with all errors of the file.
+    """
+    spec = specs.load(path)
+    try:
+        return system_from_spec(spec)
+    except SpecError as error:
+        raise located(error, spec) from None
+
+
+def compile(source: Source, target: str = "auto", order: int | None = None) -> Solver:
+    """A solver of a system: of one from `load` or `System.from_sympy`, of a spec, or of the path of a spec file.
+
+    ``target`` is ``c``, ``numpy``, or ``auto``: C if there is a compiler, else NumPy. ``order`` overrides the
+    order of the spec. Compiled C is cached by its content. Raises `SpecError`, `LimitError`, `CheckError` if the
+    mathematics is refuted, e.g. since π is not Poisson, and `ToolchainError` if C was asked for in vain.
+    """
+    if target not in TARGETS:
+        raise ValueError(f"unknown target {target!r}; there are {', '.join(TARGETS)}")
+    return solver_of(compilation_of(source, order), target)
+
+
+def compilation_of(source: Source, order: int | None = None) -> Compilation:
+    """The compilation of a source, proved; see `compile` for its arguments and errors."""
+    if order is not None and not (isinstance(order, int) and 1 <= order <= limits.ORDER):
+        raise ValueError(f"order must be an integer from 1 to {limits.ORDER}, not {order!r}")
+    if isinstance(source, Compilation):
+        if order is None:
+            return source
+        source = source.system
+    if isinstance(source, System):
+        return compile_proved(source.spec or _spec_of(source), order=order, system=source)
+    if isinstance(source, Spec):
+        return compile_proved(source, order=order)
+    if isinstance(source, str | PathLike):
+        return compile_proved(specs.load(source), order=order)
+    raise TypeError(f"cannot compile {type(source).__name__}; give a path, a System or a Spec")
+
+
+def solver_of(compilation: Compilation, target: str = "auto") -> Solver:
+    """The loaded solver of a compilation. Raises `ToolchainError` if C was asked for and cannot be compiled."""
+    from phigen.runtime.c_solver import CSolver
+    from phigen.runtime.interface import Backend, Interface
+    from phigen.runtime.numpy_solver import NumpySolver
+    from phigen.runtime.solver import Solver
+
+    program = compilation.program
+    interface = Interface(
+        name=program.name,
+        coordinates=program.coordinates,
+        order=program.order,
+        parameters={p.name: float(p.value) for p in program.parameters},
+        positive=frozenset(p.name for p in program.parameters if p.positive),
+        casimirs=program.casimirs,
+    )
+    target = chosen_target(target)
+    files = emit(program, target, f"phigen build {program.name}.yaml")
+    backend: Backend
+    if target == "c":
+        backend = CSolver.compile(files, interface)
+    else:
+        backend = NumpySolver.from_source(files[f"{program.name}.py"], interface)
+    return Solver(backend, interface)
+
+
+def chosen_target(target: str) -> str:
+    """``c`` or ``numpy``; ``auto`` is C where there is a compiler."""
+    from phigen.runtime import toolchain
+
+    if target != "auto":
+        return target
+    try:
+        toolchain.find()
+    except ToolchainError:
+        return "numpy"
+    return "c"
+
+
+def _spec_of(system: System) -> Spec:
+    """The spec of a system built in Python; the defaults of a spec file hold for the rest."""
+    return Spec(
+        name=system.name,
+        coordinates=system.coordinates,
+        poisson=system.form,
+        hamiltonian=system.hamiltonian,
+        parameters=system.parameters,
+        casimirs={name: system.casimirs[name] for name in system.declared},
+        invariants=system.invariants,
+        locations=system.locations,
+    )
