@@ -1,0 +1,153 @@
+"""From orders to terms, the choice of the cheapest form, the budget, and explicit steps."""
+
+import mpmath
+import pytest
+from support import BODY, NAMES, compile_text, compiled, values
+
+from phigen.errors import LimitError
+from phigen.scheme import assemble
+from phigen.scheme.assemble import GRAPH_TERMS, Order, generating_function, plan_order, series_of
+from phigen.scheme.collected import collect
+from phigen.scheme.generating import STEP, collected_form, graph_form
+from phigen.scheme.staging import Coefficients
+from phigen.scheme.step import elimination
+from phigen.series.hamilton_jacobi import graph_series
+
+
+@pytest.mark.parametrize(
+    ("order", "terms", "symmetric", "expected"),
+    [
+        (None, None, True, (2, 1)),
+        (1, None, True, (2, 1)),
+        (2, None, True, (2, 1)),
+        (3, None, True, (4, 3)),
+        (4, None, True, (4, 3)),
+        (5, None, True, (6, 5)),
+        (12, None, True, (12, 11)),
+        (1, None, False, (1, 1)),
+        (2, None, False, (2, 2)),
+        (5, None, False, (5, 5)),
+        (None, 1, True, (2, 1)),
+        (None, 2, True, (2, 1)),
+        (None, 3, True, (4, 3)),
+        (None, 6, True, (6, 5)),
+        (None, 2, False, (2, 2)),
+        (None, 3, False, (3, 3)),
+    ],
+)
+def test_order_and_terms(order, terms, symmetric, expected):
+    """S_1 … S_k gives order k, and k + 1 for odd k in a symmetric bi-realisation, where even S_k vanish."""
+    plan = plan_order(order, terms, symmetric=symmetric)
+    assert (plan.order, plan.terms) == expected
+
+
+def test_rounding_up_is_said():
+    assert "order 3 was asked for" in plan_order(3, None, symmetric=True).note
+    assert "S_2 = 0" in plan_order(None, 2, symmetric=True).note
+    assert plan_order(4, None, symmetric=True) == Order(4, 3)
+    assert "order 3 was asked for" in " ".join(compile_text(BODY + "order: 3\n").program.facts)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_generating_function_is_the_cheapest_of_its_forms_and_all_are_equal(name):
+    compilation = compiled(name)
+    system, realisation, terms = compilation.system, compilation.realisation, compilation.order.terms
+    coordinates, static = system.coordinates, system.parameter_names
+    chosen = generating_function(system, realisation, terms)
+    forms = list(collected_form(series_of(system, realisation, terms), coordinates, static, 10**6))
+    if terms <= GRAPH_TERMS:
+        symmetric = realisation.symmetric
+        graph = graph_series(system.hamiltonian, realisation.alpha, coordinates, terms, symmetric=symmetric)
+        forms.append(graph_form(graph, coordinates, static))
+    assert chosen.cost() == min(f.cost() for f in forms)
+    with mpmath.workdps(40):
+        at = {c: mpmath.mpf(7 + k) / 11 for k, c in enumerate([*coordinates, *static])} | {STEP: mpmath.mpf(1) / 8}
+        found = [evaluated(form, at) for form in forms]
+        for other in found[1:]:
+            assert all(abs(u - v) <= mpmath.mpf(10) ** -25 * (1 + abs(u)) for u, v in zip(found[0], other, strict=True))
+
+
+def evaluated(form, at):
+    """Gradient and Hessian of a form at a point."""
+    table = values(form.coefficients.values, at)
+    known = {**at, **{f"c:{k}": v for k, v in enumerate(table)}}
+    return values([*form.slope, *(e for row in form.hessian for e in row)], known)
+
+
+def test_few_monomials_are_collected_and_many_stay_a_graph():
+    assert "collected polynomial" in " ".join(compiled("rigid_body").program.facts)
+    assert "shared graph" in " ".join(compiled("vortices3").program.facts)
+
+
+def test_collected_polynomials_differentiate_like_the_tower():
+    compilation = compiled("kepler")
+    series = series_of(compilation.system, compilation.realisation, 3)
+    coordinates = compilation.system.coordinates
+    ring, (terms,) = collect(series.tower, [series.terms[2]], coordinates)
+    with mpmath.workdps(30):
+        at = {c: mpmath.mpf(3 + k) / 5 for k, c in enumerate([*coordinates, "mu"])}
+        for j, c in enumerate(coordinates):
+            table = Coefficients(["mu", STEP])
+            mine = ring.expression(ring.derivative(terms, j), table)
+            at |= {f"c:{k}": v for k, v in enumerate(values(table.values, at))}
+            theirs = series.tower.expression(series.tower.derivative(series.terms[2], c))
+            assert mpmath.almosteq(*values([mine, theirs], at), mpmath.mpf(10) ** -25)
+
+
+# -- the budget
+
+
+def test_a_program_beyond_the_budget_is_refused_with_a_hint(monkeypatch):
+    monkeypatch.setattr(assemble, "MOST_OPERATIONS", 100)
+    with pytest.raises(LimitError) as caught:
+        compile_text(BODY + "order: 6\n")
+    assert "order" in str(caught.value)
+    assert "ask for a lower order" in str(caught.value)
+
+
+# -- explicit steps
+
+PAIR = "coordinates: [q, p]\npoisson: {canonical: {q: [q], p: [p]}}\n"
+
+
+@pytest.mark.parametrize("side", ["q", "p"])
+@pytest.mark.parametrize(
+    ("hamiltonian", "order", "driver"),
+    [
+        ("p**2/2 - cos(q)", 1, "explicit"),
+        ("p**4 + q**4", 1, "explicit"),
+        ("p**2/2 - cos(q)", 2, "newton"),  # S_2 = H_q H_p/2 mixes q and p
+        ("p**2*q + q**2", 1, "newton"),
+        ("p**2*(1 + q**2)", 1, "newton"),
+        ("p*q", 1, "newton"),
+    ],
+)
+def test_separable_hamiltonians_give_explicit_steps(hamiltonian, order, side, driver):
+    text = f"{PAIR}birealisation: {{kind: canonical-euler, side: {side}}}\n"
+    assert compile_text(f"{text}hamiltonian: {hamiltonian}\norder: {order}\n").program.driver == driver
+
+
+def test_symmetric_realisations_are_solved_by_newton_iteration():
+    assert compile_text(f"{PAIR}hamiltonian: p**2/2 - cos(q)\norder: 1\n").program.driver == "newton"
+
+
+# -- elimination
+
+
+@pytest.mark.parametrize("n", [1, 2, 3, 4])
+def test_unrolled_elimination_solves_linear_systems(n):
+    solution, reciprocals = elimination(n)
+    with mpmath.workdps(30):
+        matrix = mpmath.matrix(n, n)
+        for i in range(n):
+            for j in range(n):
+                matrix[i, j] = (i == j) + mpmath.mpf((3 * i - 5 * j + i * j) % 7) / 23
+        side = mpmath.matrix([mpmath.mpf(2 * i - 3) / 7 for i in range(n)])
+        at = {f"J:{i}:{j}": matrix[i, j] for i in range(n) for j in range(n)}
+        at |= {f"r:{i}": side[i] for i in range(n)}
+        found = mpmath.matrix(values(solution, at))
+        assert mpmath.norm(matrix * found - side) < mpmath.mpf(10) ** -25
+        pivots = mpmath.mpf(1)
+        for r in values(reciprocals, at):
+            pivots /= r
+        assert mpmath.almosteq(pivots, mpmath.det(matrix), mpmath.mpf(10) ** -25)
