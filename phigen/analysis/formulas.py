@@ -1,0 +1,165 @@
+"""Formulas for reading: polynomials term by term, in text and in LaTeX."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from math import lcm
+from typing import Any
+
+from phigen.symbolic.expression import (
+    ONE,
+    Expression,
+    fold,
+    number,
+    power,
+    product,
+    substitute,
+    symbol,
+    symbols_of,
+    text,
+    topological,
+)
+from phigen.symbolic.tower import Poly, Tower, rational
+
+#: Terms of a formula that are shown unless all are asked for.
+SHOWN = 12
+
+#: Formulas with more nodes than this are not expanded to look for a shorter form.
+_LARGE = 400
+
+
+@dataclass(frozen=True)
+class Formula:
+    """A formula as (common divisor, terms); ``hidden`` terms are left out."""
+
+    divisor: int
+    terms: tuple[tuple[Fraction, Expression], ...]  # coefficient, monomial
+    hidden: int = 0
+
+    @property
+    def size(self) -> int:
+        """Number of terms, shown or not."""
+        return len(self.terms) + self.hidden
+
+    def __str__(self) -> str:
+        return self._joined([_monomial(m) for _, m in self.terms], _rational, " + … ({} terms)", "({})/{}")
+
+    def latex(self) -> str:
+        """The formula in LaTeX."""
+        monomials = [latex(m) for _, m in self.terms]
+        dots = r" + \cdots \text{{ ({} terms)}}"
+        return self._joined(monomials, lambda c: _sympy().latex(c), dots, r"\frac{{1}}{{{1}}} \left( {0} \right)", " ")
+
+    def _joined(self, monomials: list[str], written: Any, dots: str, quotient: str, times: str = "*") -> str:
+        if not monomials:
+            return "0"
+        parts: list[str] = []
+        for (coefficient, _), monomial in zip(self.terms, monomials, strict=True):
+            size = abs(coefficient)
+            body = written(size) if monomial == "1" else monomial if size == 1 else written(size) + times + monomial
+            sign = "-" if coefficient < 0 else "+" if parts else ""
+            parts.append(f" {sign} {body}" if parts else f"{sign}{body}")
+        joined = "".join(parts) + (dots.format(self.size) if self.hidden else "")
+        if self.divisor == 1:
+            return joined
+        if len(parts) == 1 and not self.hidden and times == "*":
+            return f"{joined}/{self.divisor}"
+        return quotient.format(joined, self.divisor)
+
+
+def of_polynomial(tower: Tower, element: Poly, most: int | None = SHOWN) -> Formula:
+    """The formula of an element of a tower; ``most`` bounds the terms shown, None shows all."""
+    terms = [(rational(c), tuple(int(e) for e in m)) for m, c in element.to_dict().items()]
+    divisor = lcm(*(c.denominator for c, _ in terms)) if terms else 1
+    if len(terms) == 1 and terms[0][0].denominator == 1:
+        divisor = 1
+    shown = terms if most is None or len(terms) <= most + 1 else terms[:most]
+    variables = [*(symbol(n) for n in tower.symbols), *(g.expression for g in tower.generators)]
+    listed = tuple((c * divisor, _power_product(variables, exponents)) for c, exponents in shown)
+    return Formula(divisor, listed, len(terms) - len(shown))
+
+
+def readable(expressions: Sequence[Expression], most: int | None = SHOWN) -> list[str]:
+    """The expressions as text, expanded where that is shorter; covectors are written ``p_NAME``."""
+    shown = with_plain_names(expressions)
+    expanded = _expanded(shown, most)
+    return [min((str(f), text(e)), key=len) if f else text(e) for f, e in zip(expanded, shown, strict=True)]
+
+
+def readable_latex(expressions: Sequence[Expression]) -> list[str]:
+    """The expressions in LaTeX, expanded where that is shorter."""
+    shown = with_plain_names(expressions)
+    expanded = _expanded(shown, None)
+    forms = [[latex(e), *([f.latex()] if f else [])] for f, e in zip(expanded, shown, strict=True)]
+    return [min(form, key=len) for form in forms]
+
+
+def latex(e: Expression) -> str:
+    """One expression in LaTeX, by sympy."""
+    from phigen.geometry.sympy_bridge import to_sympy
+
+    return str(_sympy().latex(to_sympy(e)))
+
+
+def with_plain_names(expressions: Sequence[Expression]) -> list[Expression]:
+    """The expressions with phigen's own symbols under names for readers: ``p:x1`` as ``p_x1``."""
+    names = [n for n in symbols_of(*expressions) if ":" in n]
+    return substitute(expressions, {n: symbol(n.rstrip(":").replace(":", "_")) for n in names})
+
+
+def _expanded(expressions: Sequence[Expression], most: int | None) -> Iterator[Formula | None]:
+    for e in expressions:
+        if len(topological([e])) > _LARGE:
+            yield None
+            continue
+        tower = Tower(symbols_of(e), [e])
+        yield of_polynomial(tower, tower.convert(e), most)
+
+
+def _power_product(variables: Sequence[Expression], exponents: Sequence[int]) -> Expression:
+    factors = [power(v, k) for v, k in zip(variables, exponents, strict=False) if k]
+    return product(factors) if factors else ONE
+
+
+def _monomial(e: Expression) -> str:
+    """A product as text, negative powers in one denominator."""
+    above, below = [], []
+    for factor in _factors(e):
+        if factor.op == "pow" and factor.value < 0:
+            below.append(power(factor.args[0], -factor.value))
+        else:
+            above.append(factor)
+    top = "*".join(_atom(f) for f in above) or "1"
+    if not below:
+        return top
+    bottom = "*".join(_atom(f) for f in below)
+    return f"{top}/{bottom}" if len(below) == 1 else f"{top}/({bottom})"
+
+
+def _factors(e: Expression) -> list[Expression]:
+    def visit(node: Expression, args: list[list[Expression]]) -> list[Expression]:
+        return args[0] + args[1] if node.op == "mul" else [node]
+
+    return fold([e], visit)[0]
+
+
+def _atom(e: Expression) -> str:
+    written = text(e)
+    return f"({written})" if e.op in ("add", "sub", "neg") else written
+
+
+def _rational(value: Fraction) -> str:
+    return str(value)
+
+
+def _sympy() -> Any:
+    import sympy
+
+    return sympy
+
+
+def as_number(value: Fraction) -> str:
+    """A rational number for reading: short, as a decimal if that is exact."""
+    return text(number(value)) if value.denominator > 10**4 or value.denominator == 1 else f"{float(value):g}"

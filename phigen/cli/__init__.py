@@ -1,0 +1,93 @@
+"""The command line: one module per command, imported when the command is used.
+
+``phigen --help`` and ``phigen --version`` import click and nothing heavier; so each module of a command imports
+the compiler inside its functions.
+"""
+
+from __future__ import annotations
+
+import sys
+from importlib import import_module
+from typing import Any
+
+import click
+
+from phigen._version import __version__
+from phigen.cli.console import Console
+from phigen.cli.failures import report
+
+#: Commands in the order of the help page: name, module, one line.
+COMMANDS = {
+    "new": ("phigen.cli.new", "Write a commented spec to start from."),
+    "check": ("phigen.cli.check", "Prove the mathematics of a spec, or refute it."),
+    "build": ("phigen.cli.build", "Write the C and NumPy solvers of specs."),
+    "run": ("phigen.cli.run", "Integrate an experiment of a spec and sum up what was conserved."),
+    "show": ("phigen.cli.show", "Show the formulas: π, Casimirs, α, β, S_1 … S_k."),
+    "list": ("phigen.cli.list", "List the bundled specs."),
+    "schema": ("phigen.cli.schema", "Print the JSON Schema of specs, for editors."),
+    "demo": ("phigen.cli.demo", "Compile and run the paper's Lotka–Volterra system."),
+}
+
+
+class Commands(click.Group):
+    """A group whose commands are imported on first use, and whose errors become exit codes."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        if cmd_name not in COMMANDS:
+            return None
+        command: click.Command = import_module(COMMANDS[cmd_name][0]).command
+        return command
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        if args and args[0] not in COMMANDS and not args[0].startswith("-"):
+            from difflib import get_close_matches
+
+            near = get_close_matches(args[0], COMMANDS, n=1)
+            more = f" Did you mean {near[0]!r}?" if near else f" There are {', '.join(COMMANDS)}."
+            ctx.fail(f"No such command {args[0]!r}.{more}")
+        return super().resolve_command(ctx, args)
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, line) for name, (_, line) in COMMANDS.items()])
+
+    def main(self, *args: Any, standalone_mode: bool = True, **extra: Any) -> Any:
+        """Run a command and end the process with its exit code; see `phigen.errors` for the codes."""
+        console = extra.setdefault("obj", Console())
+        try:
+            done = super().main(*args, standalone_mode=False, **extra)
+            code = done if isinstance(done, int) else 0
+        except Exception as error:
+            code = report(error, console)
+        if standalone_mode:
+            sys.exit(code)
+        return code
+
+    def invoke(self, ctx: click.Context) -> Any:
+        try:
+            return super().invoke(ctx)
+        except BrokenPipeError as error:
+            # Not left to click, which would exit with 1, the code of a wrong spec.
+            return report(error, ctx.ensure_object(Console))
+
+
+@click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(__version__, prog_name="phigen", message="%(prog)s %(version)s")
+def group() -> None:
+    """A compiler from specs of Poisson systems ẋ = π(x)∇H(x) to solvers in C and NumPy.
+
+    To start: `phigen demo`, then `phigen new mysystem`.
+
+    Data goes to stdout, messages to stderr. Exit codes: 0 ok, 1 wrong spec, 2 wrong usage, 3 limit exceeded,
+    4 internal error, 5 check failed, 6 C compiler missing or failed, 7 integration failed, 130 interrupted.
+    """
+
+
+def main() -> None:
+    """The console script ``phigen``."""
+    group.main(prog_name="phigen")

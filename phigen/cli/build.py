@@ -1,0 +1,245 @@
+"""``phigen build``: from specs to files."""
+
+from __future__ import annotations
+
+import shlex
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from phigen.cli.console import Console, out, pass_console, verbosity
+from phigen.cli.failures import Collector
+from phigen.cli.sources import ORDER, load_all, many_specs
+from phigen.errors import CheckError
+
+if TYPE_CHECKING:
+    from phigen.cli.outputs import Change
+    from phigen.compiler import Compilation
+
+DIRECTORY = "generated"
+
+#: Beyond the flags of every local library: what phigen promises that its C passes.
+STRICT = ("-Wall", "-Wextra", "-Werror")
+
+
+@dataclass(frozen=True)
+class Options:
+    """The options of one run that reach the output, and where it goes."""
+
+    directory: Path = Path(DIRECTORY)
+    targets: tuple[str, ...] = ()
+    order: int | None = None
+    single_file: bool = False
+
+    def targets_of(self, compilation: Compilation) -> tuple[str, ...]:
+        """The targets to write: those of the command line, else those of the spec."""
+        return self.targets or compilation.spec.targets
+
+    def command(self, spec_files: Sequence[str]) -> str:
+        """The command line that writes the same files."""
+        words = ["phigen", "build", *spec_files]
+        if str(self.directory) != DIRECTORY:
+            words += ["-o", str(self.directory)]
+        words += [word for target in self.targets for word in ("-t", target)]
+        words += ["--order", str(self.order)] if self.order else []
+        words += ["--single-file"] if self.single_file else []
+        return shlex.join(words)
+
+
+@click.command("build")
+@many_specs
+@click.option("-o", "--output", metavar="DIR", default=DIRECTORY, show_default=True, help="Files go to DIR/NAME/.")
+@click.option(
+    "-t", "--target", "targets", multiple=True, type=click.Choice(["c", "numpy"]), help="Instead of the spec's targets."
+)
+@click.option("--order", type=ORDER, help="Order of the method, instead of the spec's.")
+@click.option("--single-file", is_flag=True, help="C in one file, NAME.c, without a header.")
+@click.option("--compile", "compiling", is_flag=True, help="Compile the C too, to DIR/NAME/libNAME.so.")
+@click.option(
+    "--check", "checking", is_flag=True, help="Write nothing; fail if a file differs from what belongs there."
+)
+@click.option("--diff", is_flag=True, help="As --check, and print the differences.")
+@click.option("--force", is_flag=True, help="Overwrite files that were edited by hand or are not phigen's.")
+@verbosity
+@pass_console
+def command(
+    console: Console,
+    spec_files: tuple[str, ...],
+    output: str,
+    targets: tuple[str, ...],
+    order: int | None,
+    single_file: bool,
+    compiling: bool,
+    checking: bool,
+    diff: bool,
+    force: bool,
+) -> None:
+    """Write the solvers of specs: DIR/NAME/NAME.h, NAME.c and NAME.py.
+
+    SPEC is a file, or a folder that is searched for *.yaml. What the spec claims is proved first; nothing is
+    written if there is an error in any spec. Files that were edited by hand are not overwritten.
+    """
+    if (checking or diff) and compiling:
+        raise click.UsageError("--compile writes a library; --check and --diff write nothing")
+    options = Options(Path(output), tuple(dict.fromkeys(targets)), order, single_file)
+    compilations = _compile_all(console, spec_files, options)
+    planned = _plan(console, compilations, options)
+    if checking or diff:
+        lone = _orphans(spec_files, compilations, options)
+        _compare([*(c for _, changes in planned for c in changes), *lone], options.command(spec_files), diff)
+        console.note(f"{_counted(len(planned), 'system')} up to date in {options.directory}")
+        return
+    _write(console, planned, options, force, compiling)
+
+
+def _compile_all(console: Console, spec_files: Sequence[str], options: Options) -> list[Compilation]:
+    from phigen.analysis.proof import compile_proved
+
+    collector, compilations = Collector(), []
+    for spec in load_all(spec_files, collector):
+        start = time.perf_counter()
+        with collector.collecting():
+            compilations.append(compile_proved(spec, order=options.order))
+            stages = ", ".join(f"{stage} {seconds:.2f}" for stage, seconds in compilations[-1].seconds.items())
+            console.detail(f"{spec.name}: {time.perf_counter() - start:.2f} s ({stages})")
+    collector.finish()
+    for compilation in compilations:
+        if compilation.order.note:
+            console.note(f"{compilation.spec.name}: {compilation.order.note}")
+    return compilations
+
+
+def _plan(
+    console: Console, compilations: Sequence[Compilation], options: Options
+) -> list[tuple[Compilation, list[Change]]]:
+    from phigen.cli.outputs import SUFFIXES, changes
+
+    result = []
+    for compilation in compilations:
+        name, start = compilation.spec.name, time.perf_counter()
+        files: dict[str, str] = {}
+        for target in options.targets_of(compilation):
+            files |= generate(compilation, target, options)
+        console.detail(f"{name}: {time.perf_counter() - start:.2f} s emitting")
+        result.append((compilation, changes(options.directory / name, name, files, options.targets or SUFFIXES)))
+    return result
+
+
+def generate(compilation: Compilation, target: str, options: Options) -> dict[str, str]:
+    """The files of one target. Their header names a command that gives the same bytes on any machine."""
+    from phigen.compiler import emit
+
+    spec, single = compilation.spec, options.single_file and target == "c"
+    words = ["phigen build", f"{spec.name}.yaml"]
+    words += ["-t", target] if target not in spec.targets else []
+    words += ["--order", str(options.order)] if options.order not in (None, spec.order) else []
+    words += ["--single-file"] if single else []
+    return emit(compilation.program, target, " ".join(words), single_file=single)
+
+
+def _orphans(spec_files: Sequence[str], compilations: Sequence[Compilation], options: Options) -> Iterator[Change]:
+    """Files whose spec has gone; only a run over a folder can know."""
+    from phigen.cli.outputs import SUFFIXES, orphans
+
+    if any(Path(file).is_dir() for file in spec_files):
+        names = [c.spec.name for c in compilations]
+        yield from orphans(options.directory, names, options.targets or SUFFIXES)
+
+
+def _compare(planned: Sequence[Change], command: str, diff: bool) -> None:
+    """Raise CheckError unless all files are as they should be."""
+    off = [change for change in planned if change.state != "unchanged"]
+    if diff:
+        for change in off:
+            out(change.diff().rstrip("\n"))
+    if not off:
+        return
+    lines = [f"{change.path}: {_complaint(change)}" for change in off]
+    lone = [c for c in off if c.state == "stale" and not _has_successor(c, planned)]
+    remedies = [f"rm {shlex.join(str(c.path) for c in lone)}"] if lone else []
+    if len(off) > len(lone):
+        forced = " --force" if any(c.obstacle for c in off) else ""
+        remedies.insert(0, command + forced)
+    raise CheckError("\n".join([f"{_counted(len(off), 'file')} out of date", *_indented(lines), *_mend(remedies)]))
+
+
+def _complaint(change: Change) -> str:
+    if change.obstacle and change.state == "different":
+        return change.obstacle.removeprefix(f"{change.path} ")
+    return {
+        "missing": "missing",
+        "different": "differs from what its spec gives",
+        "stale": "no spec produces it any more",
+    }[change.state]
+
+
+def _has_successor(change: Change, planned: Sequence[Change]) -> bool:
+    return any(c.path.parent == change.path.parent and c.after is not None for c in planned)
+
+
+def _write(
+    console: Console,
+    planned: Sequence[tuple[Compilation, list[Change]]],
+    options: Options,
+    force: bool,
+    compiling: bool,
+) -> None:
+    from phigen.cli.outputs import apply
+
+    obstacles = [change.obstacle for _, changes in planned for change in changes if change.obstacle]
+    if obstacles and not force:
+        hint = "  hint: --diff shows the differences; --force overwrites"
+        raise CheckError("\n".join(["nothing was written", *_indented(obstacles), hint]))
+    for compilation, changes in planned:
+        apply(changes)
+        _report(console, options.directory / compilation.spec.name, compilation, changes)
+    if compiling:
+        for compilation, _ in planned:
+            if "c" in options.targets_of(compilation):
+                _compile_library(console, options.directory / compilation.spec.name, compilation.spec.name)
+
+
+def _report(console: Console, folder: Path, compilation: Compilation, changes: Sequence[Change]) -> None:
+    written = [c.path.name for c in changes if c.state in ("missing", "different")]
+    removed = [c.path.name for c in changes if c.state == "stale"]
+    said = [f"wrote {', '.join(written)}"] if written else []
+    said += [f"removed {', '.join(removed)}, which the spec no longer gives"] if removed else []
+    program = compilation.program
+    console.note(f"{folder}: {'; '.join(said) or 'unchanged'} (order {program.order}, {compilation.realisation.kind})")
+    library = folder / _library(compilation.spec.name)
+    if written and library.exists():
+        console.note(f"{library} is older than its sources; --compile makes it anew")
+
+
+def _compile_library(console: Console, folder: Path, name: str) -> None:
+    from phigen.runtime import toolchain
+
+    found, start = toolchain.find(), time.perf_counter()
+    compiler = toolchain.Compiler((*found.command, *STRICT), found.version)
+    fresh, library = folder / f".{_library(name)}.new", folder / _library(name)
+    try:
+        toolchain.compile_library([folder / f"{name}.c"], fresh, compiler)
+        fresh.replace(library)
+    finally:
+        fresh.unlink(missing_ok=True)
+    console.note(f"compiled {library} with {found.command[0]} in {time.perf_counter() - start:.2f} s")
+
+
+def _library(name: str) -> str:
+    return f"lib{name}.so"
+
+
+def _indented(lines: Sequence[str]) -> list[str]:
+    return [f"  {line}" for line in lines]
+
+
+def _mend(commands: Sequence[str]) -> list[str]:
+    return ["to mend it:", *_indented(commands)]
+
+
+def _counted(number: int, noun: str) -> str:
+    return f"{number} {noun}{'' if number == 1 else 's'}"

@@ -1,0 +1,117 @@
+"""Where messages go: stderr, as many as -q and -v ask for, in colour where somebody can see it."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+import click
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+@dataclass
+class Console:
+    """The messages of one run of phigen. Data is not its affair: commands print that with `click.echo`."""
+
+    quiet: bool = False
+    verbose: bool = False
+
+    def error(self, message: str) -> None:
+        """A message about what failed; never silenced."""
+        click.echo(_coloured(message), err=True, color=_colour())
+
+    def warn(self, message: str) -> None:
+        """Something the user should know, although the work goes on."""
+        if not self.quiet:
+            click.echo(_coloured(f"warning: {message}"), err=True, color=_colour())
+
+    def note(self, message: str) -> None:
+        """What is being done."""
+        if not self.quiet:
+            click.echo(message, err=True, color=_colour())
+
+    def detail(self, message: str) -> None:
+        """What only -v asks for."""
+        if self.verbose:
+            click.echo(message, err=True, color=_colour())
+
+    @contextmanager
+    def progress(self, label: str, length: int) -> Iterator[Callable[[int], None] | None]:
+        """A bar on stderr; gives a function of the number of steps done, or None where nobody watches."""
+        if self.quiet or not sys.stderr.isatty():
+            yield None
+            return
+        done = 0
+        with click.progressbar(length=length, label=label, file=sys.stderr) as bar:
+
+            def advance(steps: int) -> None:
+                nonlocal done
+                bar.update(steps - done)
+                done = steps
+
+            yield advance
+
+
+pass_console = click.make_pass_decorator(Console, ensure=True)
+
+
+def verbosity(command: F) -> F:
+    """The options -q and -v, which every command has."""
+
+    def store(name: str) -> Callable[[click.Context, click.Parameter, bool], None]:
+        def callback(ctx: click.Context, parameter: click.Parameter, value: bool) -> None:
+            if value:
+                setattr(ctx.ensure_object(Console), name, True)
+
+        return callback
+
+    for short, name, text in (
+        ("-v", "verbose", "Say more: seconds of each stage, tracebacks."),
+        ("-q", "quiet", "Say nothing but data and errors."),
+    ):
+        command = click.option(short, f"--{name}", is_flag=True, expose_value=False, callback=store(name), help=text)(
+            command
+        )
+    return command
+
+
+def table(rows: Sequence[Sequence[str]], *, right: Sequence[int] = ()) -> list[str]:
+    """Rows as lines of aligned columns; the columns in ``right`` are flush right."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    lines = []
+    for row in rows:
+        cells = [c.rjust(w) if i in right else c.ljust(w) for i, (c, w) in enumerate(zip(row, widths, strict=True))]
+        lines.append("  ".join(cells).rstrip())
+    return lines
+
+
+def heading(text: str) -> str:
+    """A heading on stdout, bold on a terminal."""
+    return click.style(text, bold=True)
+
+
+def out(text: str) -> None:
+    """Data on stdout."""
+    click.echo(text, color=_colour())
+
+
+def _colour() -> bool | None:
+    """None lets click look at the stream; https://no-color.org."""
+    return False if os.environ.get("NO_COLOR") else None
+
+
+def _coloured(message: str) -> str:
+    lines = message.split("\n")
+    for i, line in enumerate(lines):
+        for word, colour in (("error:", "red"), ("warning:", "yellow"), ("refuted", "red")):
+            place = line.find(word)
+            if place >= 0 and not line.startswith("    "):
+                styled = click.style(word, fg=colour, bold=True)
+                lines[i] = line[:place] + styled + line[place + len(word) :]
+                break
+    return "\n".join(lines)

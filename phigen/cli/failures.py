@@ -1,0 +1,101 @@
+"""From exceptions to what the user reads on stderr, and to exit codes."""
+
+from __future__ import annotations
+
+import os
+import sys
+import traceback
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+
+import click
+
+from phigen._version import __version__
+from phigen.cli.console import Console
+from phigen.errors import PhigenError, SpecError
+
+INTERRUPTED = 130
+#: What a shell reports of a process that SIGPIPE ended.
+BROKEN_PIPE = 141
+USAGE = 2
+
+
+class SeveralError(PhigenError):
+    """Errors of several specs, reported in one run; the exit code is the smallest of theirs."""
+
+    def __init__(self, errors: Sequence[PhigenError]) -> None:
+        super().__init__(f"{len(errors)} errors")
+        self.errors = tuple(errors)
+        self.exit_code = min(e.exit_code for e in errors)
+
+
+class Collector:
+    """Goes on after the error of one spec, to report those of all; `finish` raises what was met."""
+
+    def __init__(self) -> None:
+        self.errors: list[PhigenError] = []
+
+    @contextmanager
+    def collecting(self) -> Iterator[None]:
+        """Keep an error of phigen's for later."""
+        try:
+            yield
+        except PhigenError as error:
+            self.errors.append(error)
+
+    def finish(self) -> None:
+        """Raise what was met, if anything was."""
+        if len(self.errors) == 1:
+            raise self.errors[0]
+        if self.errors:
+            raise SeveralError(self.errors)
+
+
+def report(error: Exception, console: Console) -> int:
+    """Say what failed, and return the exit code."""
+    match error:
+        case click.exceptions.Abort():
+            console.error("interrupted")
+            return INTERRUPTED
+        case click.ClickException():
+            error.show()
+            return error.exit_code if isinstance(error, click.UsageError) else USAGE
+        case BrokenPipeError():
+            # Whoever read our output has gone. Python would complain again when it flushes stdout at the end.
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            return BROKEN_PIPE
+        case SeveralError():
+            for part in error.errors:
+                report(part, console)
+            return error.exit_code
+        case PhigenError():
+            console.error(_described(error))
+            if console.verbose and error.__cause__:
+                _show_traceback(error, console)
+            return error.exit_code
+        case OSError() if error.filename is not None:
+            console.error(f"error: {os.fspath(error.filename)}: {error.strerror or error}")
+            return USAGE
+    return _internal(error, console)
+
+
+def _described(error: PhigenError) -> str:
+    text = str(error)
+    # The diagnostics of a spec say "error:" themselves, after the place.
+    return text if isinstance(error, SpecError) or ": error:" in text.split("\n")[0] else f"error: {text}"
+
+
+def _internal(error: Exception, console: Console) -> int:
+    summary = "".join(traceback.format_exception_only(error)).strip()
+    if isinstance(error, MemoryError):
+        summary = "out of memory"
+    console.error(f"internal error: {summary}")
+    if console.verbose:
+        _show_traceback(error, console)
+    wanted = "" if console.verbose else ", and what the same command prints with -v"
+    console.error(f"  This is a bug of phigen {__version__}, not of your spec. Please report it with the spec{wanted}.")
+    return PhigenError.exit_code
+
+
+def _show_traceback(error: Exception, console: Console) -> None:
+    console.error("".join(traceback.format_exception(error)).rstrip())

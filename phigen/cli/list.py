@@ -1,0 +1,72 @@
+"""``phigen list``: the specs that come with phigen."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING
+
+import click
+
+from phigen.cli.console import out, table, verbosity
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from phigen.spec.model import Spec
+
+
+@click.command("list")
+@click.option("--path", "name", metavar="NAME", help="Print the path of one spec instead.")
+@click.option("--json", "as_json", is_flag=True, help="For machines: one object per spec.")
+@verbosity
+def command(name: str | None, as_json: bool) -> None:
+    """List the bundled specs: name, dimension, kind of π, title.
+
+    To look at one, or to start from it: cp "$(phigen list --path kepler)" .
+    """
+    from phigen import resources, spec
+    from phigen.symbolic.expression import natural_key
+
+    files = {p.stem: p for p in resources.bundled_specs().glob("*.yaml")}
+    if name is not None:
+        click.echo(_path_of(name, files))
+        return
+    specs = [spec.load(files[stem]) for stem in sorted(files, key=natural_key)]
+    if as_json:
+        click.echo(json.dumps([_described(s, str(files[s.name])) for s in specs], indent=2, ensure_ascii=False))
+        return
+    rows = [("NAME", "DIM", "STRUCTURE", "TITLE")]
+    rows += [(s.name, str(s.dimension), kind_of_structure(s), s.title) for s in specs]
+    out("\n".join(table(rows, right=[1])))
+
+
+def kind_of_structure(spec: Spec) -> str:
+    """The shape of π, recognised from its matrix."""
+    from phigen.geometry.forms import algebra_of_form, poisson_matrix
+    from phigen.geometry.shapes import recognise
+
+    matrix = poisson_matrix(spec.poisson, spec.coordinates, algebra_of_form(spec.poisson, spec.coordinates))
+    shape = recognise(spec.coordinates, matrix)
+    return str(shape).split(",")[0].split(" in ")[0]
+
+
+def _described(spec: Spec, path: str) -> dict[str, object]:
+    return {
+        "name": spec.name,
+        "title": spec.title,
+        "dimension": spec.dimension,
+        "structure": kind_of_structure(spec),
+        "order": spec.order,
+        "runs": list(spec.runs),
+        "path": path,
+    }
+
+
+def _path_of(name: str, files: dict[str, Path]) -> str:
+    from difflib import get_close_matches
+
+    if name in files:
+        return str(files[name])
+    near = get_close_matches(name, files, n=1)
+    more = f"did you mean {near[0]!r}?" if near else "phigen list shows them"
+    raise click.UsageError(f"there is no bundled spec {name!r}; {more}")

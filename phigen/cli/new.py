@@ -1,0 +1,40 @@
+"""``phigen new``: a commented spec to start from."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from phigen.cli.console import Console, pass_console, verbosity
+
+
+@click.command("new")
+@click.argument("name")
+@click.option("-o", "--output", metavar="FILE", help="Where to write it; - is stdout.  [default: NAME.yaml]")
+@verbosity
+@pass_console
+def command(console: Console, name: str, output: str | None) -> None:
+    """Write NAME.yaml, a commented spec to start from.
+
+    It is the free rigid body, ready to run: change it into your system. Existing files are left alone.
+    """
+    from phigen import spec
+    from phigen.errors import SpecError
+
+    stem = name.removesuffix(".yaml")
+    try:
+        text = spec.starter(stem)
+    except SpecError as error:  # located in a file that does not exist yet
+        (wrong,) = error.diagnostics
+        raise click.UsageError(wrong.message + (f"; {wrong.hint}" if wrong.hint else "")) from None
+    if output == "-":
+        click.echo(text, nl=False)
+        return
+    path = Path(output or f"{stem}.yaml")
+    try:
+        with path.open("x", encoding="utf-8", newline="\n") as file:
+            file.write(text)
+    except FileExistsError:
+        raise click.UsageError(f"{path} exists already; choose another name, or remove it first") from None
+    console.note(f"wrote {path}; next: phigen check {path}, phigen run {path}, phigen build {path}")

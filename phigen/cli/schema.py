@@ -1,0 +1,22 @@
+"""``phigen schema``: JSON Schema of spec files."""
+
+from __future__ import annotations
+
+import json
+
+import click
+
+from phigen.cli.console import verbosity
+
+
+@click.command("schema")
+@verbosity
+def command() -> None:
+    """Print the JSON Schema of spec files, for completion and checks in editors.
+
+    With the YAML extension of an editor: phigen schema > phigen.schema.json, and as first line of a spec
+    # yaml-language-server: $schema=phigen.schema.json
+    """
+    from phigen import spec
+
+    click.echo(json.dumps(spec.schema(), indent=2, ensure_ascii=False))
