@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 
 from phigen.errors import Diagnostic, LimitError
 from phigen.geometry.shapes import LogCanonical
 from phigen.geometry.system import System
+from phigen.realisations import karasev
 from phigen.realisations.protocol import BiRealisation
 from phigen.scheme.generating import STEP, GeneratingFunction, collected_form, graph_form
 from phigen.scheme.lowering import cost, operation_counts
+from phigen.scheme.path import build_path
 from phigen.scheme.program import Kernel, Output, Program
 from phigen.scheme.staging import Coefficients
 from phigen.scheme.step import (
@@ -22,10 +25,16 @@ from phigen.scheme.step import (
 )
 from phigen.series.hamilton_jacobi import PolynomialSeries, graph_series, polynomial_series
 from phigen.spec.model import SolverOptions
-from phigen.symbolic.expression import Expression
+from phigen.symbolic.expression import ONE, ZERO, Expression, number, total
 
 #: Most operations in one kernel; about 5 MB of C and a minute of compilation.
 MOST_OPERATIONS = 100_000
+
+DRIVERS = {
+    "explicit": "explicit",
+    "newton": "implicit, Newton iteration with the analytic matrix",
+    "path": "implicit in p, each path followed by its Taylor series to round-off",
+}
 
 #: Largest dimension whose elimination is unrolled.
 UNROLLED = 4
@@ -63,11 +72,16 @@ def plan_order(order: int | None, terms: int | None, *, symmetric: bool) -> Orde
     return Order(order, order - 1)
 
 
+def formal_alpha(system: System, realisation: BiRealisation, terms: int) -> tuple[Expression, ...]:
+    """The source map from which S_1 … S_terms are computed: for paths, its series to the degree that they need."""
+    return tuple(karasev.series(system, terms - 1)) if realisation.path and terms > 1 else realisation.alpha
+
+
 def series_of(system: System, realisation: BiRealisation, terms: int) -> PolynomialSeries:
     """S_1 … S_terms in a tower that also contains the step size."""
     return polynomial_series(
         system.hamiltonian,
-        realisation.alpha,
+        formal_alpha(system, realisation, terms),
         system.coordinates,
         [*system.parameter_names, STEP],
         terms,
@@ -80,7 +94,8 @@ def generating_function(system: System, realisation: BiRealisation, terms: int) 
     coordinates, static, symmetric = system.coordinates, system.parameter_names, realisation.symmetric
     candidates = []
     if terms <= GRAPH_TERMS:
-        graph = graph_series(system.hamiltonian, realisation.alpha, coordinates, terms, symmetric=symmetric)
+        alpha = formal_alpha(system, realisation, terms)
+        graph = graph_series(system.hamiltonian, alpha, coordinates, terms, symmetric=symmetric)
         candidates.append(graph_form(graph, coordinates, static))
     worth = min((c.cost() for c in candidates), default=MOST_OPERATIONS)
     candidates = [*collected_form(series_of(system, realisation, terms), coordinates, static, worth), *candidates]
@@ -103,8 +118,12 @@ def build_program(
     solver = solver or SolverOptions()
     generating = generating_function(system, realisation, order.terms)
     coefficients = generating.coefficients
-    kernels = _step_kernels(system, realisation, generating, coefficients)
-    driver = "explicit" if "explicit" in kernels else "newton"
+    path = build_path(system, coefficients) if realisation.path else None
+    if path:
+        kernels = _path_kernels(system, generating, coefficients)
+    else:
+        kernels = _step_kernels(system, realisation, generating, coefficients)
+    driver = "path" if path else "explicit" if "explicit" in kernels else "newton"
     kernels |= _observables(system)
     prepare = Kernel(
         "prepare",
@@ -112,14 +131,14 @@ def build_program(
         {"params": system.parameter_names, "h": (STEP,)},
         (Output("coef", tuple(coefficients.values)),),
     )
-    main = kernels[driver if driver == "explicit" else "linearise"]
+    main = kernels[{"path": "generate", "newton": "linearise"}.get(driver, driver)]
     for kernel in (prepare, main):
         _within_budget(kernel, system)
     facts = [
         f"bi-realisation: {realisation.kind}, {'symmetric' if realisation.symmetric else 'not symmetric'}",
         f"generating function: S_1 ... S_{order.terms} ({generating.form}"
         + (f", {generating.terms} terms)" if generating.terms else ")"),
-        f"step: {driver if driver == 'explicit' else 'implicit, Newton iteration with the analytic matrix'}",
+        f"step: {DRIVERS[driver]}",
     ]
     return Program(
         name=system.name,
@@ -131,6 +150,7 @@ def build_program(
         driver=driver,
         coefficients=len(coefficients.values),
         kernels={"prepare": prepare, **kernels},
+        path=path,
         relative=isinstance(system.shape, LogCanonical),
         symmetric=realisation.symmetric,
         max_iterations=solver.max_iterations,
@@ -192,9 +212,15 @@ def _step_kernels(
             named,
         )
     }
-    if n <= UNROLLED:
-        solution, reciprocals = elimination(n)
-        kernels["eliminate"] = Kernel(
+    return kernels | _elimination_kernel(n)
+
+
+def _elimination_kernel(n: int) -> dict[str, Kernel]:
+    if n > UNROLLED:
+        return {}
+    solution, reciprocals = elimination(n)
+    return {
+        "eliminate": Kernel(
             "eliminate",
             "elimination without pivoting: the solution, and the reciprocals of the pivots",
             {
@@ -203,7 +229,26 @@ def _step_kernels(
             },
             (Output("solution", tuple(solution)), Output("reciprocal", tuple(reciprocals))),
         )
-    return kernels
+    }
+
+
+def _path_kernels(system: System, generating: GeneratingFunction, coefficients: Coefficients) -> dict[str, Kernel]:
+    """∇S_h at the mean m of a path, and 1 − ½ Hess S_h(m) π(m): the Jacobian of p − ∇S_h(m(p)) up to O(h²)."""
+    n, hessian, pi = system.dimension, generating.hessian, system.poisson
+    half = number(Fraction(1, 2))
+    jacobian = [
+        (ONE if i == j else ZERO) - half * total(hessian[i][k] * pi[k][j] for k in range(n))
+        for i in range(n)
+        for j in range(n)
+    ]
+    flat = coefficients.hoist([*generating.slope, *jacobian])
+    generate = Kernel(
+        "generate",
+        "p = grad S_h(y), and the Jacobian 1 - Hess S_h(y) pi(y) / 2 of the equation for p, up to O(h^2)",
+        {"coef": _slots(coefficients), "y": system.coordinates},
+        _outputs(flat, ("slope", "jacobian"), (n, n * n)),
+    )
+    return {"generate": generate} | _elimination_kernel(n)
 
 
 def _slots(coefficients: Coefficients) -> tuple[str, ...]:

@@ -12,6 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from phigen._version import __version__
+from phigen.scheme.path import Path
 from phigen.spec.model import Parameter
 from phigen.symbolic.expression import Expression
 
@@ -47,7 +48,10 @@ class Kernel:
 
 @dataclass(frozen=True)
 class Program:
-    """A solver, ready to be printed. ``driver`` is ``newton`` or ``explicit``.
+    """A solver, ready to be printed. ``driver`` is ``newton``, ``explicit`` or ``path``.
+
+    ``path`` holds the recurrences of a path driver. A step of size h is the composition of one step of each
+    of the ``fractions`` of h.
 
     ``relative`` tells that the coordinates are positive or keep their sign (log-canonical π), so that errors
     of the inner solve count relative to each coordinate. ``facts`` are the lines of the header.
@@ -62,6 +66,8 @@ class Program:
     driver: str
     coefficients: int
     kernels: Mapping[str, Kernel]
+    path: Path | None = None
+    fractions: tuple[float, ...] = (1.0,)
     relative: bool = False
     symmetric: bool = True
     max_iterations: int = 20
@@ -79,7 +85,7 @@ class Program:
     @property
     def driver_unit(self) -> str:
         """What the operation counts of the header refer to."""
-        return "step" if self.driver == "explicit" else "Newton iteration"
+        return {"explicit": "step", "newton": "Newton iteration"}.get(self.driver, "evaluation of the equation for p")
 
     @property
     def dimension(self) -> int:

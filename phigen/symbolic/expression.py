@@ -34,6 +34,8 @@ from hashlib import blake2b
 from typing import Any, TypeVar
 from weakref import WeakValueDictionary
 
+from phigen.symbolic.special import SPECIAL, coefficient, order_of
+
 #: Functions of an expression, with their number of arguments.
 FUNCTIONS: dict[str, int] = {
     "exp": 1,
@@ -54,7 +56,7 @@ FUNCTIONS: dict[str, int] = {
     "abs": 1,
     "sign": 1,  # made by differentiating abs, not accepted in a spec
     "power": 2,  # base**exponent with an exponent that is not a rational number
-}
+} | dict.fromkeys(SPECIAL, 1)  # of the exponential bi-realisation, not accepted in a spec
 
 _NODES: WeakValueDictionary[tuple[Any, ...], Expression] = WeakValueDictionary()
 _RANK = {"number": 0, "pi": 1, "E": 1, "symbol": 2}
@@ -187,6 +189,10 @@ def add(a: Expression, b: Expression) -> Expression:
         return sub(a, b.args[0])
     if a.op == "neg":
         return sub(b, a.args[0])
+    if _has_minus(b):
+        return sub(a, neg(b))
+    if _has_minus(a):
+        return sub(b, neg(a))
     if _commuting_key(b) < _commuting_key(a):
         a, b = b, a
     return _node("add", (a, b))
@@ -206,9 +212,13 @@ def sub(a: Expression, b: Expression) -> Expression:
         return add(a, b.args[0])
     if a.op == "neg":
         return neg(add(a.args[0], b))
-    if b.is_number and b.value < 0:
-        return add(a, number(-b.value))
+    if (b.is_number and b.value < 0) or _has_minus(b):
+        return add(a, neg(b))
     return _node("sub", (a, b))
+
+
+def _has_minus(e: Expression) -> bool:
+    return e.op == "mul" and e.args[0].is_number and e.args[0].value < 0
 
 
 def neg(a: Expression) -> Expression:
@@ -305,6 +315,8 @@ def call(function: str, *args: Expression) -> Expression:
         raise ValueError(f"{function} takes {FUNCTIONS[function]} argument(s), not {len(args)}")
     first = args[0]
     if len(args) == 1 and first.is_zero:
+        if function in SPECIAL:
+            return number(coefficient(order_of(function), 0))
         if function in ("exp", "cos", "cosh"):
             return ONE
         if function not in ("log", "acos", "acosh"):
@@ -457,6 +469,8 @@ def partials(e: Expression) -> list[Expression]:
             return [call("sign", a)]
         case "sign":
             return [ZERO]
+        case "phi0" | "phi1":
+            return [call(SPECIAL[order_of(e.op) + 1], a)]
     raise ValueError(f"no derivative is known for {e.op}")
 
 

@@ -8,6 +8,7 @@ from fractions import Fraction
 from typing import Any
 
 from phigen.symbolic.expression import Expression, fold, topological
+from phigen.symbolic.special import SPECIAL, in_double, order_of, precisely
 
 _RATIONAL = frozenset({"number", "symbol", "add", "sub", "neg", "mul", "abs", "sign"})
 
@@ -130,6 +131,9 @@ def _visitor(
             raise DomainError(f"{node.op} is not rational")
         if node.op in ("pi", "E"):
             return +getattr(library, node.op.lower())
+        if node.op in SPECIAL:
+            order = order_of(node.op)
+            return in_double(order, args[0]) if library is math else precisely(library, order, args[0])
         return getattr(library, node.op)(*args)
 
     return visit

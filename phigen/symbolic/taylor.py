@@ -26,6 +26,7 @@ from phigen.symbolic.expression import (
     topological,
     total,
 )
+from phigen.symbolic.special import SPECIAL, coefficient, order_of
 
 
 class Ring(Protocol):
@@ -93,7 +94,7 @@ def closure(roots: Sequence[Expression]) -> list[Expression]:
 
 
 def _by_derivative(e: Expression) -> bool:
-    return bool(e.args) and e.op not in ("add", "sub", "neg", "mul", "pow")
+    return bool(e.args) and e.op not in ("add", "sub", "neg", "mul", "pow", *SPECIAL)
 
 
 class Taylor:
@@ -105,6 +106,7 @@ class Taylor:
         self.moving = set(variable_symbols)
         self.series: dict[int, list[Any]] = {id(e): [] for e in self.order}
         self._zero = ring.constant(0)
+        self._powers: dict[int, list[list[Any]]] = {}
 
     def coefficients(self, e: Expression) -> list[Any]:
         """The coefficients of a node, as far as they are known."""
@@ -133,7 +135,7 @@ class Taylor:
                 return self._convolve(args[0], args[1], i)
             case "pow":
                 return self._power(e, args[0], i)
-        return self._function(e, args, i)
+        return self._analytic(e, args[0], i) if e.op in SPECIAL else self._function(e, args, i)
 
     def _constant(self, e: Expression) -> Any:
         if e.op == "number":
@@ -189,3 +191,17 @@ class Taylor:
                 if not (zero(a[j]) or zero(d[i - j]))
             ]
         return self.ring.combine(terms)
+
+    def _analytic(self, e: Expression, a: list[Any], i: int) -> Any:
+        """The level of a function with a power series at 0, composed with a series that begins there."""
+        order = order_of(e.op)
+        if i == 0:
+            if not self.ring.vanishes(a[0]):
+                raise ValueError(f"{e.op} has a series about 0 only, and its argument does not vanish at p = 0")
+            return self.ring.constant(coefficient(order, 0))
+        powers = self._powers.setdefault(id(e), [])  # powers[k - 1] is a**k, whose levels below k vanish
+        powers.append([self._zero] * i)
+        for k in range(i):
+            powers[k].append(a[i] if k == 0 else self._convolve(a, [*powers[k - 1], self._zero], i))
+        terms = [p[i] * self.ring.constant(coefficient(order, k)) for k, p in enumerate(powers, 1)]
+        return self.ring.combine([t for t in terms if not self.ring.vanishes(t)])

@@ -17,6 +17,7 @@ from flint import Ordering, fmpq, fmpq_mpoly_ctx
 
 from phigen.symbolic.expression import EULER, ONE, PI, Expression, call, derivatives, fold, number, power, symbol
 from phigen.symbolic.horner import horner
+from phigen.symbolic.special import SPECIAL, coefficient, order_of
 
 #: An element of a tower: ``flint.fmpq_mpoly``. Elements of different towers do not mix.
 Poly = Any
@@ -180,6 +181,8 @@ class Tower:
         if name == "abs":
             return self.function("sign", args) * args[0]
         first = args[0]
+        if name in SPECIAL:
+            return self._special(order_of(name), first)
         if len(args) == 1 and first.is_constant() and first == 0 and name in ("exp", "cos", "cosh"):
             return self.constant(1)
         if len(args) == 1 and first.is_constant() and first == 0 and name not in ("log", "acos", "acosh"):
@@ -196,6 +199,19 @@ class Tower:
                 if ratio and ratio > 0 and ratio.denominator == 1:
                     return self.variable(g.name) ** int(ratio)
         return self._generator(name, args)
+
+    def _special(self, order: int, s: Poly) -> Poly:
+        """φ, φ' or φ'' of an element, written with φ(s) and 1/s alone by the Riccati equation of φ."""
+        if s.is_constant() and s == 0:
+            return self.constant(coefficient(order, 0))
+        phi = self._generator("phi0", [s])
+        if order == 0:
+            return phi
+        inverse = self._reciprocal(s)
+        slope = (s * phi**2 * Fraction(1, 2) - phi * Fraction(3, 2) + Fraction(1, 8)) * inverse
+        if order == 1:
+            return slope
+        return (phi**2 * Fraction(1, 2) - slope * Fraction(5, 2) + s * phi * slope) * inverse
 
     def power(self, base: Poly, exponent: Fraction | int) -> Poly:
         """base ** exponent for a rational exponent."""

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from fractions import Fraction
 
 from phigen.symbolic.expression import Expression, fold
+from phigen.symbolic.special import SPECIAL
 
 #: Binding strength: sums, products, atoms. Unary minus is printed in parentheses inside products.
 SUM, PRODUCT, ATOM = 1, 2, 3
@@ -57,6 +58,8 @@ class Printer:
                 return self._power(e.value, args[0])
             case "pi" | "E":
                 return self.constants[e.op], ATOM
+            case op if op in SPECIAL:  # a function of the generated file, whose name is chosen there
+                return f"{self.name('function:' + op)}({args[0][0]})", ATOM
             case "sign":
                 return self.functions["sign"].format(args[0][0]), ATOM
             case _:

@@ -6,11 +6,17 @@ from collections.abc import Mapping
 
 from phigen.scheme.program import Program
 from phigen.targets.c.kernels import apart, function, member, wrapped_arguments
+from phigen.targets.c.path import kinds
+from phigen.targets.c.path import lines as path_lines
+from phigen.targets import special
 from phigen.targets.header import CHECKSUM, checksum, header_lines, plain
 from phigen.targets.rendering import render
 
 #: Backward differences kept for the starting guess of the inner solve.
 HISTORY = 8
+
+#: Most terms of the expansion of a path; a path that needs more is cut into pieces.
+TERMS = 30
 
 
 def emit(program: Program, command: str, *, single_file: bool = False) -> dict[str, str]:
@@ -49,6 +55,11 @@ def _values(program: Program) -> dict[str, object]:
         "casimir_size": max(1, len(program.casimirs)),
         "version": program.version,
         "sha256": program.spec_sha256,
+        "stages": len(program.fractions),
+        "fractions": ", ".join(repr(f) for f in program.fractions),
+        "terms": TERMS,
+        "series": len(program.path.series) if program.path else 0,
+        "remembered": "p" if program.path else "y - x",
         "coefficients": max(1, program.coefficients),
         "history": HISTORY,
         "coordinates": ", ".join(f"{c} = x[{i}]" for i, c in enumerate(program.coordinates)),
@@ -70,13 +81,11 @@ def _signatures(program: Program) -> dict[str, list[str]]:
     """Signatures that are too long for one line with a long name."""
     name, n = program.name, program.dimension
     solver, params, status = f"{name}_solver *s", f"const {name}_params *params", f"{name}_status "
-    increment = [f"const double increment[{n}]", f"const double increment_jacobian[{n * n}]"]
     members = ["double *x", "size_t members", "double h", "size_t steps", "unsigned char *status"]
     return {
         "init": wrapped_arguments(f"{status}{name}_init(", [solver, params, f"const double x0[{n}]"]),
         "ensemble": wrapped_arguments(f"{status}{name}_ensemble(", [params, *members]),
         "hamiltonian": wrapped_arguments(f"double {name}_hamiltonian(", [params, f"const double x[{n}]"]),
-        "advance": wrapped_arguments(f"static int {name}_advance(", [solver, *increment, f"const double delta[{n}]"]),
     }
 
 
@@ -90,15 +99,25 @@ def _body(program: Program) -> str:
     def exported(name: str) -> str:
         return function(program, kernels[name], exported=True) + "\n"
 
-    pieces = [_render("preamble.c", values), static("prepare")]
-    if program.driver == "explicit":
-        pieces += [static("explicit"), _render("explicit.c", values)]
-    else:
-        pieces += [static("linearise"), _render("pivoting.c", values)]
+    pieces = [_render("preamble.c", values)]
+    pieces += [_render("phi.c", special.values(f, f"{program.name}_{f}")) for f in special.used(program)]
+    pieces.append(static("prepare"))
+    if program.driver != "explicit":
+        pieces += [static("generate" if program.path else "linearise"), _render("pivoting.c", values)]
         if "eliminate" in kernels:
             pieces += [static("eliminate"), _render("unrolled.c", values)]
-        pieces += [_render("size_relative.c" if program.relative else "size.c", values)]
-        pieces += [_render("newton.c", values), _render("step.c", values)]
+        pieces += [_render("remember.c", values)]
+    pieces.append(_render("advance.c", values))
+    if program.path:
+        piece = values | path_lines(program, program.path)
+        pieces += [_render(f"taylor_{kind}.c", values) for kind in kinds(program.path)]
+        pieces += [_render("piece.c", piece)]
+        pieces += [_render("path.c", values), _render("path_step.c", values)]
+    elif program.driver == "newton":
+        pieces += [_render("size_relative.c" if program.relative else "size.c", values), _render("newton.c", values)]
+    else:
+        pieces += [static("explicit"), _render("explicit.c", values)]
+    pieces.append(_render("compose.c", values))
     pieces += [_render("api.c", values), static("energy"), exported("casimirs"), exported("vector_field")]
     if any(apart(program) in piece for piece in pieces):
         pieces.insert(1, _render("apart.c", values))

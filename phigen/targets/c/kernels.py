@@ -6,6 +6,7 @@ import textwrap
 from collections.abc import Sequence
 
 from phigen.scheme.program import Kernel, Program
+from phigen.symbolic.special import SPECIAL
 from phigen.targets.code import Code, lower, parts
 from phigen.targets.header import plain
 from phigen.targets.names import C_RESERVED, Scope
@@ -94,7 +95,10 @@ def wrapped_arguments(head: str, arguments: Sequence[str]) -> list[str]:
 
 def _body(program: Program, kernel: Kernel, code: Code, workspace: int, *, exported: bool) -> list[str]:
     arrays = [*kernel.inputs, *(o.name for o in kernel.outputs), "work"]
-    scope = Scope({*C_RESERVED, *arrays})
+    functions = {f"function:{f}": f"{program.name}_{f}" for f in SPECIAL}
+    scope = Scope({*C_RESERVED, *arrays, *functions.values()})
+    for f, name in functions.items():
+        scope.bind(f, name)
     lines: list[str] = []
     touched: set[str] = set()
     for array, symbols in kernel.inputs.items():
@@ -112,12 +116,12 @@ def _body(program: Program, kernel: Kernel, code: Code, workspace: int, *, expor
                 lines.append(f"    const double {scope[s]} = {array}[{i}];")
     for k in range(workspace):
         scope.bind(f"w:{k}", f"work[{k}]")
-    printer = Printer(lambda n: scope[n], FUNCTIONS, CONSTANTS, "pow")
+    show = printer(scope)
     for a in code.assignments:
         declare = "" if a.target.startswith("w:") else "const double "
-        lines.append(f"    {declare}{scope[a.target]} = {printer(a.value)};")
+        lines.append(f"    {declare}{scope[a.target]} = {show(a.value)};")
     filled = {s.array for s in code.stores}
-    lines += [f"    {s.array}[{s.index}] = {printer(s.value)};" for s in code.stores]
+    lines += [f"    {s.array}[{s.index}] = {show(s.value)};" for s in code.stores]
     unused = [i for i in kernel.inputs if i not in touched]
     unused += [o.name for o in kernel.outputs if o.name not in filled]
     if workspace and not any("work[" in line for line in lines):
@@ -131,6 +135,11 @@ def _body(program: Program, kernel: Kernel, code: Code, workspace: int, *, expor
 def apart(program: Program) -> str:
     """The macro that keeps the parts of a long function from being inlined into one again."""
     return f"{program.name}_APART"
+
+
+def printer(scope: Scope) -> Printer:
+    """Prints lowered trees in C, with the names of a scope."""
+    return Printer(lambda n: scope[n], FUNCTIONS, CONSTANTS, "pow")
 
 
 def member(name: str) -> str:

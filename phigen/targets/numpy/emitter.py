@@ -7,6 +7,8 @@ from collections.abc import Sequence
 
 from phigen.scheme.program import Kernel, Program
 from phigen.symbolic.expression import Expression
+from phigen.symbolic.special import SPECIAL
+from phigen.targets import special
 from phigen.targets.code import Code, lower
 from phigen.targets.header import CHECKSUM, checksum, header_lines, plain
 from phigen.targets.names import PYTHON_RESERVED, Scope
@@ -31,7 +33,9 @@ CONSTANTS = {"pi": "np.pi", "E": "np.e"}
 def emit(program: Program, command: str) -> dict[str, str]:
     """The file name and its contents."""
     kernels = program.kernels
-    pieces = [render("numpy", "preamble.py", _values(program)), _function(program, kernels["prepare"])]
+    pieces = [render("numpy", "preamble.py", _values(program))]
+    pieces += [render("numpy", "phi.py", special.values(f, f"_{f}")) for f in special.used(program)]
+    pieces.append(_function(program, kernels["prepare"]))
     if program.driver == "explicit":
         pieces += [_function(program, kernels["explicit"]), render("numpy", "explicit.py", _values(program))]
     else:
@@ -69,7 +73,9 @@ def _function(program: Program, kernel: Kernel) -> str:
     code = lower(kernel)
     arguments = ", ".join("parameters" if i == "params" else i for i in kernel.inputs)
     lines = [f"def _{kernel.name}({arguments}):", *_docstring(kernel.purpose)]
-    scope = Scope({*PYTHON_RESERVED, *kernel.inputs, *(o.name for o in kernel.outputs)})
+    scope = Scope({*PYTHON_RESERVED, *kernel.inputs, *(o.name for o in kernel.outputs), *(f"_{f}" for f in SPECIAL)})
+    for f in SPECIAL:
+        scope.bind(f"function:{f}", f"_{f}")
     lines += _bindings(kernel, code, scope)
     printer = Printer(lambda n: scope[n], FUNCTIONS, CONSTANTS, "np.power")
     lines += [f"    {scope[a.target]} = {printer(a.value)}" for a in code.assignments]

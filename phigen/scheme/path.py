@@ -1,0 +1,160 @@
+"""The path ṁ = π(m)p as Taylor recurrences: what a solver for Karasev's bi-realisation follows at run time.
+
+Each node of the graph of π(m)p is a series in the time along the path. The coefficient of order k of a node
+follows from those of its arguments up to order k (sums, products) or of the node itself below k (powers,
+functions), so the coefficients of m are computed one order at a time, as many as the size of p calls for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+
+from phigen.geometry.system import System, hamiltonian_vector_field
+from phigen.scheme.lowering import expand_powers
+from phigen.scheme.staging import Coefficients
+from phigen.series.hamilton_jacobi import momentum
+from phigen.symbolic.expression import Expression, fold, partials, raw, symbol
+from phigen.symbolic.taylor import closure
+
+
+@dataclass(frozen=True)
+class Term:
+    """``factor · Σ`` of one kind over the orders j of two series:
+
+    ``product``: Σ_{j=0}^{k} a_j b_{k−j} · ``chain``: Σ_{j=1}^{k} (j/k) a_j b_{k−j}, for b = ∂f/∂a ·
+    ``power``: Σ_{j=1}^{k} (r j/k − (k−j)/k) a_j b_{k−j}, for b = aʳ.
+    """
+
+    kind: str
+    a: int
+    b: int
+    exponent: Fraction = Fraction(0)
+
+
+@dataclass(frozen=True)
+class Series:
+    """One node: ``first``, its value at order 0, as an expression, and the rule for orders k ≥ 1.
+
+    ``linear`` lists pairs (series, factor) that contribute factor · a_k, ``terms`` sums over orders, and
+    ``divisor`` is the series by whose value at order 0 the terms are divided (powers), or None.
+    Symbols ``s:i`` in expressions are the values at order 0 of series i.
+    """
+
+    first: Expression
+    linear: tuple[tuple[int, Expression], ...] = ()
+    terms: tuple[Term, ...] = ()
+    divisor: int | None = None
+
+
+@dataclass(frozen=True)
+class Path:
+    """The recurrences: series 0 … n−1 are the coordinates m_i, ``slopes[i]`` is the series of ṁ_i.
+
+    ``fixed`` are values that stay constant along a path (functions of p and the coefficients), symbols ``f:i``.
+    """
+
+    series: tuple[Series, ...]
+    slopes: tuple[int, ...]
+    fixed: tuple[Expression, ...]
+
+
+def build_path(system: System, coefficients: Coefficients) -> Path:
+    """The recurrences of ṁ = π(m)p; values that depend on parameters only go to the table."""
+    covector = [symbol(momentum(c)) for c in system.coordinates]
+    flow = coefficients.hoist(hamiltonian_vector_field(system.poisson, covector))
+    return _Builder(system.coordinates).path(_chains(flow))
+
+
+def _chains(roots: Sequence[Expression]) -> list[Expression]:
+    """Positive integer powers written as products; other powers have a recurrence of their own."""
+
+    def visit(e: Expression, args: list[Expression]) -> Expression:
+        if not e.args:
+            return e
+        if e.op == "pow" and e.value.denominator == 1 and e.value > 0:
+            return expand_powers([raw("pow", (args[0],), e.value)])[0]
+        return raw(e.op, tuple(args), e.value)
+
+    return fold(roots, visit)
+
+
+class _Builder:
+    def __init__(self, coordinates: Sequence[str]) -> None:
+        self.coordinates = tuple(coordinates)
+        self.series = [Series(symbol(c)) for c in coordinates]
+        self.fixed: list[Expression] = []
+        self._series_of: dict[int, int] = {}
+        self._fixed_of: dict[int, Expression] = {}
+        self._keep: list[Expression] = []
+
+    def path(self, flow: Sequence[Expression]) -> Path:
+        order = closure(flow)
+        self._keep = order  # values are found by id, so the nodes must live
+        moving = self._moving(order)
+        for e in order:
+            if e.op == "symbol" and e.value in self.coordinates:
+                self._series_of[id(e)] = self.coordinates.index(e.value)
+            elif id(e) in moving:
+                self._series_of[id(e)] = len(self.series)
+                # Functions refer to series of their derivatives, which may come later: filled in below.
+                self.series.append(Series(symbol("pending")))
+        for e in order:
+            if id(e) in moving and e.args:
+                self.series[self._series_of[id(e)]] = self._rule(e)
+        slopes = tuple(self._as_series(f) for f in flow)  # may add series
+        return Path(tuple(self.series), slopes, tuple(self.fixed))
+
+    def _moving(self, order: Sequence[Expression]) -> set[int]:
+        moving: set[int] = set()
+        for e in order:
+            if (e.op == "symbol" and e.value in self.coordinates) or any(id(a) in moving for a in e.args):
+                moving.add(id(e))
+        return moving
+
+    def _as_series(self, e: Expression) -> int:
+        """The series of a node; a fixed one becomes a series without further terms."""
+        if id(e) not in self._series_of:
+            value = self._value(e)
+            self._series_of[id(e)] = len(self.series)
+            self.series.append(Series(value))
+        return self._series_of[id(e)]
+
+    def _value(self, e: Expression) -> Expression:
+        """The value of a node at order 0, as a symbol or a number."""
+        if id(e) in self._series_of:
+            return symbol(f"s:{self._series_of[id(e)]}")
+        if not e.args:
+            return e
+        if id(e) not in self._fixed_of:
+            self._fixed_of[id(e)] = symbol(f"f:{len(self.fixed)}")
+            self.fixed.append(e)
+        return self._fixed_of[id(e)]
+
+    def _rule(self, e: Expression) -> Series:
+        values = [self._value(a) for a in e.args]
+        first = raw(e.op, tuple(values), e.value)
+        moving = [(k, self._series_of[id(a)]) for k, a in enumerate(e.args) if id(a) in self._series_of]
+        one, minus = raw("number", (), Fraction(1)), raw("number", (), Fraction(-1))
+        match e.op:
+            case "add":
+                return Series(first, tuple((s, one) for _, s in moving))
+            case "sub":
+                return Series(first, tuple((s, minus if k else one) for k, s in moving))
+            case "neg":
+                return Series(first, ((moving[0][1], minus),))
+            case "mul" if len(moving) == 1:
+                (k, s) = moving[0]
+                return Series(first, ((s, values[1 - k]),))
+            case "mul":
+                return Series(first, (), (Term("product", moving[0][1], moving[1][1]),))
+            case "pow" if e.value == 2:
+                return Series(first, (), (Term("product", moving[0][1], moving[0][1]),))
+            case "pow":
+                own = self._series_of[id(e)]
+                term = Term("power", moving[0][1], own, e.value)
+                return Series(first, (), (term,), moving[0][1])
+        slopes = partials(e)
+        chain = tuple(Term("chain", s, self._as_series(slopes[k])) for k, s in moving)
+        return Series(first, (), chain)

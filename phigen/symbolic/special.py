@@ -1,0 +1,102 @@
+"""The function φ of the exponential bi-realisation, and its first two derivatives.
+
+φ(s) = (1 − w cot w)/s with w = √s/2, analytic through s = 0 and for s < 0 (where cot becomes coth); poles at
+s = 4π²n². It is the even part of z/(1 − e^{−z}) in disguise: (z/2) coth(z/2) = 1 + z² φ(−z²).
+
+- φ(s) = Σ a_n sⁿ with a_n = |B_{2n+2}|/(2n+2)!
+- sφ' = 1/8 − (3/2)φ + ½sφ² (Riccati), hence (n + 3/2) a_n = ½ Σ_{i+j=n−1} a_i a_j, a_0 = 1/12
+- φ(s) = Σ_{n≥1} 2/(4π²n² − s): without its nearest pole the series converges for |s| < 16π²
+
+The names of the derivatives as functions of expressions are ``phi0``, ``phi1``, ``phi2``.
+"""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+from functools import cache
+from typing import Any
+
+#: φ, φ', φ''; further derivatives are not available.
+SPECIAL = ("phi0", "phi1", "phi2")
+
+#: Below these magnitudes of s: the plain series; the pole and the series of the rest; beyond, the closed form.
+NEAR, MIDDLE = 0.25, 16.0
+NEAR_TERMS, MIDDLE_TERMS = 9, 21
+POLE = 4 * math.pi**2
+
+_PI = Fraction(31415926535897932384626433832795028841971693993751058209749445923078164062862089986, 10**82)
+
+
+@cache
+def _series(n: int) -> Fraction:
+    if n == 0:
+        return Fraction(1, 12)
+    return sum((_series(i) * _series(n - 1 - i) for i in range(n)), Fraction(0)) / (2 * n + 3)
+
+
+def order_of(name: str) -> int:
+    """Which derivative of φ a name of `SPECIAL` is."""
+    return SPECIAL.index(name)
+
+
+def coefficient(order: int, n: int) -> Fraction:
+    """The coefficient of sⁿ in the series of the derivative of that order, exactly."""
+    return _series(n + order) * (math.factorial(n + order) // math.factorial(n))
+
+
+def near_coefficients(order: int) -> list[float]:
+    """Coefficients for |s| < `NEAR`, the constant first; full double precision."""
+    return [float(coefficient(order, n)) for n in range(NEAR_TERMS)]
+
+
+@cache
+def rest_coefficients(order: int) -> list[float]:
+    """Coefficients, for |s| < `MIDDLE`, of what the pole 2·order!/(4π² − s)^{order+1} leaves."""
+    rest = []
+    for n in range(MIDDLE_TERMS):
+        factor = math.factorial(n + order) // math.factorial(n)
+        rest.append(float((_series(n + order) - 2 / (4 * _PI**2) ** (n + order + 1)) * factor))
+    return rest
+
+
+def in_double(order: int, s: float) -> float:
+    """The value in double precision, as the generated code computes it."""
+    if abs(s) < NEAR:
+        return _polynomial(near_coefficients(order), s)
+    if abs(s) < MIDDLE:
+        pole: float = 2.0 * math.factorial(order) / (POLE - s) ** (order + 1)
+        return pole + _polynomial(rest_coefficients(order), s)
+    w = 0.5 * math.sqrt(abs(s))
+    return float(_closed(order, s, w / (math.tan(w) if s > 0 else math.tanh(w))))
+
+
+def precisely(context: Any, order: int, s: Any) -> Any:
+    """The value in an mpmath context, to its precision but for two digits."""
+    if abs(s) < 1:
+        terms = int(context.dps / 1.5) + 6  # a_n decreases like (4π²)^{−n}
+        value = context.zero
+        for n in reversed(range(terms)):
+            c = coefficient(order, n)
+            value = value * s + context.mpf(c.numerator) / c.denominator
+        return value
+    w = context.sqrt(abs(s)) / 2
+    return _closed(order, s, w / (context.tan(w) if s > 0 else context.tanh(w)))
+
+
+def _closed(order: int, s: Any, c: Any) -> Any:
+    """The value from c = w cot w (w coth w for s < 0), by the Riccati equation."""
+    phi0 = (1 - c) / s
+    if order == 0:
+        return phi0
+    phi1 = (s * phi0**2 / 2 - 3 * phi0 / 2 + 0.125) / s
+    if order == 1:
+        return phi1
+    return (phi0**2 / 2 - 5 * phi1 / 2 + s * phi0 * phi1) / s
+
+
+def _polynomial(coefficients: list[float], s: float) -> float:
+    value = 0.0
+    for c in reversed(coefficients):
+        value = value * s + c
+    return value
