@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from phigen.scheme.program import Program
-from phigen.targets.c.kernels import apart, function, member, wrapped_arguments
-from phigen.targets.c.path import kinds
-from phigen.targets.c.path import lines as path_lines
 from phigen.targets import special
+from phigen.targets.c.kernels import apart, function, member, printer, wrapped_arguments
 from phigen.targets.header import CHECKSUM, checksum, header_lines, plain
+from phigen.targets.path import Syntax, kinds, reads_coefficients, statements
 from phigen.targets.rendering import render
 
 #: Backward differences kept for the starting guess of the inner solve.
@@ -89,6 +88,18 @@ def _signatures(program: Program) -> dict[str, list[str]]:
     }
 
 
+def _path_syntax(program: Program) -> Syntax:
+    return Syntax(
+        printer=printer,
+        covector="p[{i}]",
+        fixed="const double f{i} = {value};",
+        first="s[{i}][0] = {value};",
+        following="s[{i}][k] = {value};",
+        slope="s[{i}][k + 1] = s[{slope}][k] / (k + 1);",
+        sums=program.name,
+    )
+
+
 def _body(program: Program) -> str:
     values = _values(program)
     kernels = program.kernels
@@ -109,7 +120,8 @@ def _body(program: Program) -> str:
         pieces += [_render("remember.c", values)]
     pieces.append(_render("advance.c", values))
     if program.path:
-        piece = values | path_lines(program, program.path)
+        unused = [] if reads_coefficients(program.path) else ["(void)coef;"]
+        piece = values | statements(program, program.path, _path_syntax(program)) | {"unused": unused}
         pieces += [_render(f"taylor_{kind}.c", values) for kind in kinds(program.path)]
         pieces += [_render("piece.c", piece)]
         pieces += [_render("path.c", values), _render("path_step.c", values)]

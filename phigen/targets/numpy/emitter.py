@@ -12,8 +12,12 @@ from phigen.targets import special
 from phigen.targets.code import Code, lower
 from phigen.targets.header import CHECKSUM, checksum, header_lines, plain
 from phigen.targets.names import PYTHON_RESERVED, Scope
+from phigen.targets.path import Syntax, statements
 from phigen.targets.printer import Printer
 from phigen.targets.rendering import render
+
+#: Most terms of the expansion of a path, as in the C target.
+TERMS = 30
 
 FUNCTIONS = {
     "asin": "np.arcsin",
@@ -30,6 +34,21 @@ FUNCTIONS = {
 CONSTANTS = {"pi": "np.pi", "E": "np.e"}
 
 
+def _printer(scope: Scope) -> Printer:
+    return Printer(lambda n: scope[n], FUNCTIONS, CONSTANTS, "np.power")
+
+
+PATH_SYNTAX = Syntax(
+    printer=_printer,
+    covector="p[:, {i}]",
+    fixed="f{i} = {value}",
+    first="s[{i}].append({value} + 0.0)",
+    following="s[{i}].append({value})",
+    slope="s[{i}].append(s[{slope}][k] / (k + 1))",
+    sums="",
+)
+
+
 def emit(program: Program, command: str) -> dict[str, str]:
     """The file name and its contents."""
     kernels = program.kernels
@@ -38,8 +57,13 @@ def emit(program: Program, command: str) -> dict[str, str]:
     pieces.append(_function(program, kernels["prepare"]))
     if program.driver == "explicit":
         pieces += [_function(program, kernels["explicit"]), render("numpy", "explicit.py", _values(program))]
+    elif program.path:
+        path = _values(program) | statements(program, program.path, PATH_SYNTAX)
+        pieces += [_function(program, kernels["generate"]), render("numpy", "path.py", path)]
+        pieces += [render("numpy", "solve.py", path), render("numpy", "path_step.py", path)]
     else:
-        pieces += [_function(program, kernels["linearise"]), render("numpy", "newton.py", _values(program))]
+        pieces += [_function(program, kernels["linearise"]), render("numpy", "solve.py", _values(program))]
+        pieces += [render("numpy", "newton.py", _values(program))]
     pieces += [render("numpy", "api.py", _values(program))]
     pieces += [_function(program, kernels[k]) for k in ("energy", "casimirs", "vector_field")]
     pieces += [render("numpy", "observables.py", _values(program))]
@@ -58,6 +82,9 @@ def _values(program: Program) -> dict[str, object]:
         "coordinates": _strings(program.coordinates),
         "casimirs": _strings(program.casimirs),
         "defaults": [f'"{p.name}": {float(p.value)!r}' for p in program.parameters],
+        "fractions": "(" + "".join(f"{f!r}, " for f in program.fractions).rstrip() + ")",
+        "terms": TERMS,
+        "series": len(program.path.series) if program.path else 0,
         "max_iterations": program.max_iterations,
         "tolerance": repr(program.tolerance),
         # The floor of the scale of a component: see _size.
@@ -77,7 +104,7 @@ def _function(program: Program, kernel: Kernel) -> str:
     for f in SPECIAL:
         scope.bind(f"function:{f}", f"_{f}")
     lines += _bindings(kernel, code, scope)
-    printer = Printer(lambda n: scope[n], FUNCTIONS, CONSTANTS, "np.power")
+    printer = _printer(scope)
     lines += [f"    {scope[a.target]} = {printer(a.value)}" for a in code.assignments]
     lines.append(_result(program, kernel, code, printer))
     return "\n".join(lines) + "\n"

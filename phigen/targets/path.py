@@ -1,0 +1,91 @@
+"""The path ṁ = π(m)p as statements: Taylor recurrences, for the templates that run them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from phigen.scheme.lowering import expand_powers
+from phigen.scheme.path import Path, Series, Term
+from phigen.scheme.program import Program
+from phigen.symbolic.expression import Expression, symbols_of
+from phigen.targets.names import Scope
+from phigen.targets.printer import Printer
+
+Text = Callable[[Expression], str]
+
+
+@dataclass(frozen=True)
+class Syntax:
+    """How a target writes the pieces of a statement."""
+
+    printer: Callable[[Scope], Printer]
+    covector: str  # component i of p
+    fixed: str  # the statement that defines fixed value i
+    first: str  # the statement that sets the first coefficient of series i
+    following: str  # the statement that sets coefficient k ≥ 1 of series i
+    slope: str  # the statement that sets coefficient k + 1 of coordinate i
+    sums: str  # the prefix of the functions that sum over orders
+
+
+def statements(program: Program, path: Path, syntax: Syntax) -> dict[str, list[str]]:
+    """Statements by purpose: ``fixed`` values, ``first`` coefficients, ``rules`` for order k, ``slopes``."""
+    show = syntax.printer(_scope(program, path, syntax))
+
+    def text(e: Expression) -> str:
+        return show(expand_powers([e])[0])
+
+    derived = list(enumerate(path.series))[program.dimension :]
+    return {
+        "fixed": [syntax.fixed.format(i=i, value=text(e)) for i, e in enumerate(path.fixed)],
+        "first": [syntax.first.format(i=i, value=text(q.first)) for i, q in derived],
+        "rules": [syntax.following.format(i=i, value=_rule(q, text, syntax.sums)) for i, q in derived],
+        "slopes": [syntax.slope.format(i=i, slope=slope) for i, slope in enumerate(path.slopes)],
+    }
+
+
+def reads_coefficients(path: Path) -> bool:
+    """Whether some statement reads the table of coefficients."""
+    roots = [*path.fixed, *(q.first for q in path.series), *(f for q in path.series for _, f in q.linear)]
+    return any(s.startswith("c:") for s in symbols_of(*roots))
+
+
+def kinds(path: Path) -> list[str]:
+    """The kinds of sums over orders that the path needs, in a fixed order."""
+    return [k for k in ("product", "chain", "power") if any(t.kind == k for q in path.series for t in q.terms)]
+
+
+def _scope(program: Program, path: Path, syntax: Syntax) -> Scope:
+    scope = Scope(())
+    for i, c in enumerate(program.coordinates):
+        scope.bind(f"p:{c}", syntax.covector.format(i=i))
+    for i in range(program.coefficients):
+        scope.bind(f"c:{i}", f"coef[{i}]")
+    for i in range(len(path.series)):
+        scope.bind(f"s:{i}", f"s[{i}][0]")
+    for i in range(len(path.fixed)):
+        scope.bind(f"f:{i}", f"f{i}")
+    return scope
+
+
+def _rule(q: Series, text: Text, sums: str) -> str:
+    pieces = [_linear(index, factor, text) for index, factor in q.linear]
+    pieces += [("+", _term(t, sums)) for t in q.terms]
+    if not pieces:
+        return "0.0"
+    first = ("-" if pieces[0][0] == "-" else "") + pieces[0][1]
+    total = " ".join([first, *(f"{sign} {p}" for sign, p in pieces[1:])])
+    return f"({total}) / s[{q.divisor}][0]" if q.divisor is not None else total
+
+
+def _linear(index: int, factor: Expression, text: Text) -> tuple[str, str]:
+    if factor.is_number and abs(factor.value) == 1:
+        return "-" if factor.value < 0 else "+", f"s[{index}][k]"
+    return "+", f"{text(factor)} * s[{index}][k]"
+
+
+def _term(t: Term, sums: str) -> str:
+    if t.kind == "power":
+        exponent = f"{t.exponent.numerator}.0 / {t.exponent.denominator}.0"
+        return f"{sums}_power(s[{t.a}], s[{t.b}], {exponent}, k)"
+    return f"{sums}_{t.kind}(s[{t.a}], s[{t.b}], k)"
