@@ -13,6 +13,7 @@ from collections.abc import Iterator, Sequence
 from fractions import Fraction
 
 from phigen.geometry.system import System
+from phigen.realisations import truncated
 from phigen.realisations.protocol import BiRealisation, covector_names
 from phigen.symbolic.expression import ZERO, Expression, call, fold, number, rebuild, substitute, symbol, symbols_of
 from phigen.symbolic.tower import Poly, Tower
@@ -20,10 +21,14 @@ from phigen.symbolic.verdict import Statement, decide_elements, decide_zero
 
 
 def check(system: System, realisation: BiRealisation) -> list[Statement]:
-    """Statements on the unit, the three families of brackets, and the simplified forms used by the solver."""
+    """Statements on the unit, the three families of brackets, and the simplified forms used by the solver.
+
+    Of a truncation (``exact`` False) the brackets are stated, and proved, up to its degree less one.
+    """
+    degree = None if realisation.exact else realisation.degree
     return [
         _unit(system, realisation),
-        *_brackets(system, realisation),
+        *(_brackets(system, realisation) if degree is None else truncated.brackets(system, realisation, degree)),
         _simplified_forms(system, realisation),
     ]
 

@@ -28,6 +28,7 @@ class BiRealisation:
     - ``increment``: β − α, simplified in the same way
     - ``symmetric``: whether β(x, p) = α(x, −p), proved
     - ``exact``: False for a truncation, whose solver is Poisson only up to its order
+    - ``degree``: of a truncation: α and β are right up to this degree in p, their brackets up to one less
     - ``path``: the solver follows the path ṁ = π(m)p itself (Karasev's construction); ``alpha`` and ``beta``
       are then the formal series, truncated, from which the S_i are computed, and never evaluated
     - ``explanation``: what it is and why it was chosen, for the user; ``reference``: where it comes from
@@ -42,6 +43,7 @@ class BiRealisation:
     symmetric: bool
     exact: bool = True
     path: bool = False
+    degree: int | None = None
     explanation: str = ""
     reference: str = PAPER
 

@@ -76,12 +76,18 @@ PoissonForm = MatrixForm | CanonicalForm | LogCanonicalForm | LieAlgebraForm | N
 
 @dataclass(frozen=True)
 class BirealisationChoice:
-    """The user's choice: a kind of the catalogue and its options (``custom``: alpha, beta)."""
+    """The user's choice: a kind of the catalogue and its options (``custom``: alpha, beta).
+
+    ``order`` is the order of the method where the caller overrides that of the spec; truncations need it.
+    """
 
     kind: str = "auto"
     alpha: tuple[Expression, ...] = ()
     beta: tuple[Expression, ...] = ()
     side: str = "q"  # canonical-euler
+    spray: str | tuple[Expression, ...] = "auto"  # spray: auto, flat, natural or the components f_j(x, p)
+    degree: int | None = None  # spray: degree in p of a truncation, None for what the order needs
+    order: int | None = None
 
 
 @dataclass(frozen=True)

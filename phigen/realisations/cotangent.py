@@ -1,0 +1,104 @@
+"""Exterior calculus on T*U in the polynomial ring: what a Poisson spray and Moser's trick are computed with.
+
+Variables are z = (x_1, …, x_n, p_1, …, p_n). The canonical form is ω = Σ dx_i ∧ dp_i, so that {x_i, p_j} = δ_ij.
+The *weight* of a form counts its factors p and dp: it is the eigenvalue under the Euler field E = Σ p_i ∂_{p_i}.
+A spray has weight 1, ω has weight 1, and L_X raises weights by 1. Functions and forms are kept split by weight.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from fractions import Fraction
+
+from phigen.realisations.protocol import covector_names
+from phigen.symbolic.expression import Expression, symbols_of
+from phigen.symbolic.tower import Poly, Tower
+
+#: A vector field or a 1-form: one component for each variable.
+Components = list[Poly]
+#: A 2-form Σ w_ab dz_a ∧ dz_b: (a, b) with a < b → w_ab, zeros left out.
+TwoForm = dict[tuple[int, int], Poly]
+#: Weight → part of that weight.
+GradedFunction = dict[int, Poly]
+GradedForm = dict[int, TwoForm]
+
+
+class Cotangent:
+    """The ring of functions on T*U that holds some expressions, closed under all derivatives in x and p.
+
+    ``size`` is n; variable a < n is x_a, variable n + i is p_i. Parameters are symbols of the ring.
+    """
+
+    def __init__(self, coordinates: Sequence[str], expressions: Sequence[Expression]) -> None:
+        self.size = len(coordinates)
+        self.names = (*coordinates, *covector_names(coordinates))
+        others = [s for s in symbols_of(*expressions) if s not in self.names]
+        self.tower = Tower([*self.names, *others], expressions, self.names)
+        self.variables = [self.tower.variable(name) for name in self.names]
+
+    # -- functions --------------------------------------------------------------------------------
+
+    def along(self, field: Components, f: Poly) -> Poly:
+        """L_Y f = Σ Y_a ∂_a f."""
+        return self.tower.combine(
+            y * d for y, name in zip(field, self.names, strict=True) if y != 0 and (d := self.derivative(f, name)) != 0
+        )
+
+    def derivative(self, f: Poly, name: str) -> Poly:
+        """∂f/∂z for a variable's name."""
+        return self.tower.derivative(f, name)
+
+    def scaled(self, f: Poly, factor: Fraction) -> Poly:
+        """factor · f."""
+        return f * self.tower.constant(factor)
+
+    # -- forms ------------------------------------------------------------------------------------
+
+    def canonical(self) -> TwoForm:
+        """ω = Σ dx_i ∧ dp_i."""
+        return {(i, self.size + i): self.tower.constant(1) for i in range(self.size)}
+
+    def contract(self, field: Components, form: TwoForm) -> Components:
+        """ι_Y Σ w_ab dz_a ∧ dz_b = Σ w_ab (Y_a dz_b − Y_b dz_a)."""
+        result = [self.tower.zero] * len(self.names)
+        for (a, b), w in form.items():
+            result[b] = result[b] + w * field[a]
+            result[a] = result[a] - w * field[b]
+        return result
+
+    def exterior(self, form: Components) -> TwoForm:
+        """d Σ λ_b dz_b."""
+        result: TwoForm = {}
+        for b, component in enumerate(form):
+            if component == 0:
+                continue
+            for a, name in enumerate(self.names):
+                if a != b and (d := self.derivative(component, name)) != 0:
+                    key, term = ((a, b), d) if a < b else ((b, a), -d)
+                    result[key] = result[key] + term if key in result else term
+        return {key: w for key, w in result.items() if w != 0}
+
+    def lie(self, field: Components, form: TwoForm) -> TwoForm:
+        """L_Y of a closed form, d ι_Y."""
+        return self.exterior(self.contract(field, form))
+
+    def vanishes(self, form: TwoForm) -> bool:
+        """Whether the form is proved to be 0."""
+        return all(self.tower.is_zero(w) for w in form.values())
+
+    def sum(self, forms: Iterable[tuple[Fraction, TwoForm]]) -> TwoForm:
+        """A linear combination."""
+        result: TwoForm = {}
+        for factor, form in forms:
+            for key, w in form.items():
+                term = self.scaled(w, factor)
+                result[key] = result[key] + term if key in result else term
+        return {key: w for key, w in result.items() if w != 0}
+
+    def euler(self) -> Components:
+        """E = Σ p_i ∂_{p_i}."""
+        return [self.tower.zero] * self.size + self.variables[self.size :]
+
+    def dual(self, form: Components) -> Components:
+        """The field Y with ι_Y ω = λ: its x part is λ_p, its p part −λ_x."""
+        return [*form[self.size :], *(-f for f in form[: self.size])]

@@ -1,0 +1,75 @@
+"""Moser's trick by recursion in the weight: a map ψ, the identity to first order on p = 0, with ψ*Ω = ω.
+
+Ω = ω + Ω₃ + Ω₅ + … is closed, Ω_w of weight w in (p, dp) (`phigen.realisations.cotangent`). The lowest remainder
+Ω_w has the primitive λ = ι_E Ω_w / w, since L_E Ω_w = w Ω_w = d ι_E Ω_w. With ι_Y ω = −λ,
+
+    exp(Y)*Ω = Ω + L_Y Ω + ½ L_Y² Ω + … = ω + (terms of weight above w),
+
+and so on: ψ = exp(Y_2) ∘ exp(Y_4) ∘ …, Y_{w−1} raising weights by w − 1. Moser's trick itself integrates a
+time-dependent field; the recursion reaches the same normal form with one homogeneous field for each weight.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+
+from phigen.realisations.cotangent import Components, Cotangent, GradedForm, GradedFunction
+
+
+@dataclass(frozen=True)
+class Step:
+    """The factor exp(Y) of ψ, with Y of weight ``weight``."""
+
+    weight: int
+    field: Components
+
+
+def straighten(space: Cotangent, forms: GradedForm, top: int) -> list[Step]:
+    """The factors of ψ in the order in which functions are pulled back, right up to weight ``top`` of ψ*Ω = ω.
+
+    ``forms`` are the parts of Ω by weight, ω at weight 1, odd weights only. Parts that vanish give no factor.
+    """
+    steps = []
+    for weight in range(3, top + 1, 2):
+        remainder = forms.get(weight, {})
+        if space.vanishes(remainder):
+            continue
+        primitive = space.contract(space.euler(), remainder)
+        field = space.dual([space.scaled(f, Fraction(-1, weight)) for f in primitive])
+        forms = _transported(space, forms, Step(weight - 1, field), top)
+        steps.append(Step(weight - 1, field))
+    return steps
+
+
+def _transported(space: Cotangent, forms: GradedForm, step: Step, top: int) -> GradedForm:
+    """exp(Y)*Ω up to a weight."""
+    result: GradedForm = {}
+    for weight, form in forms.items():
+        term = form
+        for j in range((top - weight) // step.weight + 1):
+            if j:
+                term = space.sum([(Fraction(1, j), space.lie(step.field, term))])
+            if not term:
+                break
+            raised = weight + j * step.weight
+            result[raised] = space.sum([(Fraction(1), result.get(raised, {})), (Fraction(1), term)])
+    return result
+
+
+def pulled_back(space: Cotangent, f: GradedFunction, steps: Sequence[Step], top: int) -> GradedFunction:
+    """ψ*f up to a weight; exp(Y) acts on functions as the Lie series of Y."""
+    for step in steps:
+        result: GradedFunction = {}
+        for weight, part in f.items():
+            term = part
+            for j in range((top - weight) // step.weight + 1):
+                if j:
+                    term = space.scaled(space.along(step.field, term), Fraction(1, j))
+                if term == 0:
+                    break
+                raised = weight + j * step.weight
+                result[raised] = result[raised] + term if raised in result else term
+        f = result
+    return f

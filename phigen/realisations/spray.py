@@ -1,0 +1,315 @@
+"""Poisson sprays: the flow of X = Σ (πp)_i ∂_{x_i} + Σ f_j(x, p) ∂_{p_j}, f_j quadratic in p, and Moser's trick.
+
+With ω = Σ dx_i ∧ dp_i and τ(x, p) = x, the paper (section "Poisson Spray and Moser's trick") takes α̅ = τ,
+β̅ = τ∘Φ¹, Ω = ∫₀¹ Φˢ*ω ds, and ψ with ψ*Ω = ω; then α = α̅∘ψ, β = β̅∘ψ. Here ψ = Φ^{−½}∘ψ₀, so that
+
+    α = τ∘Φ^{−½}∘ψ₀,    β = τ∘Φ^{½}∘ψ₀,    ψ₀*Ω₀ = ω,    Ω₀ = ∫_{−½}^{½} Φˢ*ω ds = Σ_{k even} L_Xᵏ ω / ((k+1)! 2ᵏ).
+
+X changes sign under p → −p up to the reversal of p, hence β(x, p) = α(x, −p): symmetric for every spray. ψ₀ is the
+identity to first order on p = 0; ψ is not (the paper says it is), for it moves x by −½πp.
+
+Where L_X² ω = 0, Ω₀ = ω and ψ₀ = id: with the flow in closed form this gives the constant and the log-canonical
+bi-realisations, and those of nilpotent flows with linear Φˢ*ω. For the flat spray (f = 0)
+Ω₀ = Σ d(mean_i of the path) ∧ dp_i and p·(mean − x) = 0, so that ψ₀ keeps p: that is Karasev's construction, with the
+same S_i. Another spray changes S_3 by G(x, ∇H), G cubic in p, since two symmetric bi-realisations differ by a
+symplectic map that is the identity to first order on p = 0.
+
+Sprays and symplectic realisations: M. Crainic, I. Mărcuţ, J. Symplectic Geom. 9 (2011).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from math import factorial
+
+from phigen.errors import Diagnostic, LimitError
+from phigen.geometry.shapes import LogCanonical
+from phigen.geometry.system import System, hamiltonian_vector_field
+from phigen.realisations.axioms import check
+from phigen.realisations.cotangent import Components, Cotangent, GradedForm, GradedFunction
+from phigen.realisations.moser import Step, pulled_back, straighten
+from phigen.realisations.protocol import (
+    PAPER,
+    BiRealisation,
+    covector_names,
+    covector_symbols,
+    is_symmetric,
+    refuse,
+    reversed_covector,
+)
+from phigen.spec.model import BirealisationChoice
+from phigen.symbolic.expression import ZERO, Expression, call, number, symbol, symbols_of
+from phigen.symbolic.tower import Poly
+from phigen.symbolic.verdict import PROVED, shortened
+
+KIND = "spray"
+REFERENCE = f"{PAPER}, section on Poisson sprays; M. Crainic, I. Mărcuţ, J. Symplectic Geom. 9 (2011)"
+
+#: A Lie series is taken for nilpotent if it ends within so many terms.
+LONGEST = 8
+#: Most terms of one polynomial of a series.
+MOST_TERMS = 20_000
+#: A search for a closed form gives up at polynomials with more terms than this.
+SEARCHED_TERMS = 500
+DEFAULT_ORDER = 4
+
+
+@dataclass(frozen=True)
+class Spray:
+    """The field X on T*U, components for x then p, in the ring that holds it; ``name`` says which spray it is."""
+
+    space: Cotangent
+    field: Components
+    name: str
+
+    def apply(self, f: Poly) -> Poly:
+        """L_X f."""
+        return self.space.along(self.field, f)
+
+
+def build(system: System, choice: BirealisationChoice) -> BiRealisation:
+    """The symmetric bi-realisation of a Poisson spray: exact where it is found in closed form, else a truncation.
+
+    ``choice.spray`` is ``flat`` (f = 0), ``natural`` (log-canonical π: f_j = −p_j Σ_i a_ji x_i p_i, which keeps each
+    x_j p_j), ``auto`` (natural where there is one, else flat) or the n expressions f_j. ``choice.degree`` is the degree
+    in p of a truncation, by default one more than the (even) order of the method; the defect of a step as a Poisson map
+    is then two orders smaller than its error. Raises `SpecError` unless each f_j is a quadratic form in p, and for a
+    degree too small for the order; `LimitError` for series that are too long.
+    """
+    spray = make_spray(system, choice.spray)
+    exact = _half_flows(system, spray) or _terminating(system, spray)
+    if exact is not None:
+        return exact
+    return _truncation(system, spray, choice)
+
+
+# -- the spray -----------------------------------------------------------------------------------------
+
+
+def make_spray(system: System, given: str | Sequence[Expression]) -> Spray:
+    """The spray that a spec asks for, see `build`; SpecError if it is none."""
+    name, forces = _covector_part(system, given)
+    velocity = hamiltonian_vector_field(system.poisson, covector_symbols(system.coordinates))
+    space = Cotangent(system.coordinates, [*velocity, *forces])
+    spray = Spray(space, space.tower.convert_all([*velocity, *forces]), name)
+    _expect_quadratic(system, spray, forces)
+    return spray
+
+
+def _covector_part(system: System, given: str | Sequence[Expression]) -> tuple[str, Sequence[Expression]]:
+    if not isinstance(given, str):
+        return "given in the spec", _checked(system, given)
+    if given == "natural" or (given == "auto" and isinstance(system.shape, LogCanonical)):
+        return "natural", _natural(system)
+    if given in ("auto", "flat"):
+        return "flat", [ZERO] * system.dimension
+    raise refuse(f"unknown spray {given!r}", "auto, flat, natural or one expression for each coordinate")
+
+
+def _natural(system: System) -> list[Expression]:
+    if not isinstance(system.shape, LogCanonical):
+        raise refuse(
+            f"the natural spray is that of {{x_i, x_j}} = a_ij x_i x_j; this π is {system.shape}", "try spray: flat"
+        )
+    p = covector_symbols(system.coordinates)
+    products = [symbol(c) * pi for c, pi in zip(system.coordinates, p, strict=True)]
+    rates = hamiltonian_vector_field(system.shape.a, products)
+    return [-(pj * rate) for pj, rate in zip(p, rates, strict=True)]
+
+
+def _checked(system: System, forces: Sequence[Expression]) -> Sequence[Expression]:
+    if len(forces) != system.dimension:
+        raise refuse(f"spray has {len(forces)} components for {system.dimension} coordinates")
+    allowed = {*system.coordinates, *system.parameter_names, *covector_names(system.coordinates)}
+    unknown = [s for s in symbols_of(*forces) if s not in allowed]
+    if unknown:
+        raise refuse(f"spray uses {unknown[0]}, which is no coordinate, parameter or p_NAME")
+    return forces
+
+
+def _expect_quadratic(system: System, spray: Spray, forces: Sequence[Expression]) -> None:
+    """A smooth function that is homogeneous of degree 2 is a quadratic form, so the ring decides."""
+    space, n = spray.space, system.dimension
+    tower = space.tower
+    inside = [
+        k
+        for k, g in enumerate(tower.generators, len(tower.symbols))
+        if any(tower.depends_on(a, space.names[n:]) for a in g.arguments)
+    ]
+    for c, component, e in zip(system.coordinates, spray.field[n:], forces, strict=True):
+        degrees = {sum(m[n : 2 * n]) for m in component.to_dict()}
+        if degrees - {2} or any(component.degrees()[k] for k in inside):
+            raise refuse(
+                f"spray: the component of p_{c}, {shortened(e)}, is not homogeneous of degree 2 in the covector",
+                "a spray has components Σ f_kl(x) p_k p_l",
+            )
+
+
+def lie_series(spray: Spray, f: Poly, length: int, most_terms: int = MOST_TERMS) -> list[Poly]:
+    """L_Xᵏ f / k! for k = 0 … length; LimitError beyond ``most_terms`` terms."""
+    result = [f]
+    for k in range(1, length + 1):
+        result.append(spray.space.scaled(spray.apply(result[-1]), Fraction(1, k)))
+        if len(result[-1]) > most_terms:
+            raise LimitError(
+                [Diagnostic(f"the Lie series of the spray has more than {most_terms} terms", hint="lower the degree")]
+            )
+    return result
+
+
+def centred_form(spray: Spray, top: int) -> GradedForm:
+    """The parts of Ω₀ = ∫_{−½}^{½} Φˢ*ω ds up to a weight: L_Xᵏ ω / ((k+1)! 2ᵏ) at weight k + 1, k even."""
+    space, form = spray.space, spray.space.canonical()
+    result = {1: form}
+    for k in range(1, top):
+        form = space.lie(spray.field, form)
+        if k % 2 == 0:
+            result[k + 1] = space.sum([(Fraction(1, factorial(k + 1) * 2**k), form)])
+    return result
+
+
+# -- closed forms --------------------------------------------------------------------------------------
+
+
+def _half_flows(system: System, spray: Spray) -> BiRealisation | None:
+    """α = τ∘Φ^{−½}, β = τ∘Φ^{½}: for L_X² ω = 0 and a flow in closed form."""
+    space = spray.space
+    if not space.vanishes(centred_form(spray, 3)[3]):
+        return None
+    flows = [_closed_flow(spray, i) for i in range(system.dimension)]
+    if any(flow is None for flow in flows):
+        return None
+    displacement, increment = zip(*(flow for flow in flows if flow is not None), strict=True)
+    explanation = "its flow has a closed form and ∫Φˢ*ω ds over −½ ≤ s ≤ ½ is ω, so that α and β are half a step of it"
+    return _exact(system, spray, displacement, increment, explanation)
+
+
+def _closed_flow(spray: Spray, i: int) -> tuple[Expression, Expression] | None:
+    """x_i∘Φ^{−½} − x_i and x_i∘Φ^{½} − x_i∘Φ^{−½}, if the Lie series of x_i ends or L_X x_i = v x_i with L_X v = 0."""
+    tower = spray.space.tower
+    x = tower.variable(spray.space.names[i])
+    rate, rest = divmod(spray.field[i], x)
+    if rest == 0 and rate != 0 and tower.is_zero(spray.apply(rate)):
+        half = number(Fraction(1, 2)) * tower.expression(rate)
+        own = symbol(spray.space.names[i])
+        return own * (call("exp", -half) - 1), 2 * (own * call("sinh", half))
+    series = _finite_series(spray, x)
+    if series is None:
+        return None
+    terms = {k: spray.space.scaled(term, Fraction(-1, 2) ** k) for k, term in enumerate(series)}
+    return _differences(spray.space, terms)
+
+
+def _finite_series(spray: Spray, f: Poly) -> list[Poly] | None:
+    """The Lie series of f if it ends."""
+    try:
+        series = lie_series(spray, f, LONGEST, SEARCHED_TERMS)
+    except LimitError:
+        return None
+    return series if spray.space.tower.is_zero(series[-1]) else None
+
+
+def _differences(space: Cotangent, alpha: GradedFunction) -> tuple[Expression, Expression]:
+    """α − x and β − α from the parts of α by degree in p, β(x, p) = α(x, −p)."""
+    displacement = space.tower.combine(f for k, f in alpha.items() if k > 0)
+    odd = space.tower.combine(f for k, f in alpha.items() if k % 2)
+    return space.tower.expression(displacement), space.tower.expression(odd * space.tower.constant(-2))
+
+
+def _terminating(system: System, spray: Spray) -> BiRealisation | None:
+    """A nilpotent flow whose series for α ends too; the axioms prove that what was found is all of it."""
+    coordinates = [spray.space.tower.variable(c) for c in system.coordinates]
+    if any(_finite_series(spray, x) is None for x in coordinates):
+        return None
+    try:
+        alpha = alpha_series(spray, LONGEST)
+    except LimitError:
+        return None
+    if any(part != 0 for f in alpha for k, part in f.items() if k > LONGEST // 2):
+        return None
+    displacement, increment = zip(*(_differences(spray.space, f) for f in alpha), strict=True)
+    found = _exact(system, spray, displacement, increment, "its flow is nilpotent and Moser's recursion ends")
+    return found if all(s.verdict == PROVED for s in check(system, found)) else None
+
+
+def _exact(
+    system: System, spray: Spray, displacement: Sequence[Expression], increment: Sequence[Expression], why: str
+) -> BiRealisation:
+    alpha, beta = _maps(system, displacement)
+    symmetric = is_symmetric(alpha, beta, system.coordinates)
+    return BiRealisation(
+        KIND,
+        system.coordinates,
+        alpha,
+        beta,
+        tuple(displacement),
+        tuple(increment),
+        symmetric,
+        explanation=f"Poisson spray ({spray.name}): {why}; exact and symmetric",
+        reference=REFERENCE,
+    )
+
+
+def _maps(system: System, displacement: Sequence[Expression]) -> tuple[tuple[Expression, ...], tuple[Expression, ...]]:
+    alpha = tuple(symbol(c) + d for c, d in zip(system.coordinates, displacement, strict=True))
+    return alpha, tuple(reversed_covector(alpha, system.coordinates))
+
+
+# -- the formal series ---------------------------------------------------------------------------------
+
+
+def moser_steps(spray: Spray, degree: int) -> list[Step]:
+    """The factors of ψ₀ that α needs up to a degree in p."""
+    return straighten(spray.space, centred_form(spray, degree + 1), degree + 1)
+
+
+def alpha_series(spray: Spray, degree: int) -> list[GradedFunction]:
+    """α = τ∘Φ^{−½}∘ψ₀ by degree in p, up to ``degree``, for each coordinate."""
+    space, result = spray.space, []
+    steps = moser_steps(spray, degree)
+    for x in space.variables[: space.size]:
+        series = lie_series(spray, x, degree)
+        flowed = {k: space.scaled(f, Fraction(-1, 2) ** k) for k, f in enumerate(series) if f != 0}
+        result.append(pulled_back(space, flowed, steps, degree))
+    return result
+
+
+def _truncation(system: System, spray: Spray, choice: BirealisationChoice) -> BiRealisation:
+    degree = _degree(system, choice)
+    alpha = alpha_series(spray, degree)
+    displacement, increment = zip(*(_differences(spray.space, f) for f in alpha), strict=True)
+    maps = _maps(system, displacement)
+    return BiRealisation(
+        KIND,
+        system.coordinates,
+        *maps,
+        tuple(displacement),
+        tuple(increment),
+        is_symmetric(*maps, system.coordinates),
+        exact=False,
+        degree=degree,
+        explanation=f"Poisson spray ({spray.name}): no closed form was found; approximate, Poisson up to degree "
+        f"{degree} in p: α and β are formal series cut off there, so that a step h is a Poisson map, and keeps "
+        f"Casimirs, up to O(h^{degree + 1}) only; symmetric",
+        reference=REFERENCE,
+    )
+
+
+def _degree(system: System, choice: BirealisationChoice) -> int:
+    order = _order(system, choice)
+    least = order + order % 2 - 1
+    if choice.degree is None:
+        return least + 2
+    if choice.degree < least:
+        raise refuse(
+            f"degree {choice.degree} is too small for order {order}, which takes α and β up to degree {least} in p",
+            f"degree: {least + 2} makes a step a Poisson map up to O(h^{least + 3})",
+        )
+    return choice.degree
+
+
+def _order(system: System, choice: BirealisationChoice) -> int:
+    spec = system.spec
+    return choice.order or (spec and (spec.order or (spec.terms and spec.terms + spec.terms % 2))) or DEFAULT_ORDER

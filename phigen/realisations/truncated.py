@@ -1,0 +1,83 @@
+"""The axioms of a truncated bi-realisation, proved degree by degree in p.
+
+If α and β are right up to degree d in p, their brackets are right up to degree d − 1, since {·, ·} takes one
+derivative in p. So the statements are identities between homogeneous parts:
+
+    Σ_{k+l=m+1} {α_i^(k), α_j^(l)} = (π_ij∘α)^(m)    for m = 0 … d − 1,    and likewise for β and for (α, β).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from phigen.geometry.system import System
+from phigen.realisations.protocol import BiRealisation, covector_names
+from phigen.symbolic.expression import ZERO, Expression, substitute, symbols_of
+from phigen.symbolic.taylor import Taylor, closure
+from phigen.symbolic.tower import Poly, Tower
+from phigen.symbolic.verdict import Statement, decide_elements
+
+
+class _Parts:
+    """The homogeneous parts in p, up to a degree, of expressions in x and p; and brackets of them."""
+
+    def __init__(self, system: System, expressions: Sequence[Expression], degree: int) -> None:
+        self.coordinates, self.covector = system.coordinates, covector_names(system.coordinates)
+        at_zero = substitute(closure(expressions), dict.fromkeys(self.covector, ZERO))
+        variables = [*self.coordinates, *self.covector]
+        others = [s for s in symbols_of(*expressions) if s not in variables]
+        self.tower = Tower([*variables, *others], at_zero, variables)
+        taylor = Taylor(expressions, self.tower, self.covector)
+        for k in range(degree + 1):
+            # Along p ↦ tp the coefficient of t^k is the part of degree k.
+            taylor.advance({c: self.tower.variable(c) if k == 1 else self.tower.zero for c in self.covector})
+        self.parts = [taylor.coefficients(e) for e in expressions]
+        self._slopes: dict[tuple[int, int, str], Poly] = {}
+
+    def _slope(self, e: int, k: int, name: str) -> Poly:
+        key = (e, k, name)
+        if key not in self._slopes:
+            self._slopes[key] = self.tower.derivative(self.parts[e][k], name)
+        return self._slopes[key]
+
+    def bracket(self, e: int, f: int, degree: int) -> Poly:
+        """The part of a degree of the bracket of two expressions, given by index."""
+        result = self.tower.zero
+        for k in range(degree + 2):
+            for c, p in zip(self.coordinates, self.covector, strict=True):
+                result += self._product(e, k, c, f, degree + 1 - k, p) - self._product(e, k, p, f, degree + 1 - k, c)
+        return result
+
+    def _product(self, e: int, k: int, a: str, f: int, m: int, b: str) -> Poly:
+        left = self._slope(e, k, a)
+        return left * self._slope(f, m, b) if left != 0 else left
+
+
+def brackets(system: System, realisation: BiRealisation, degree: int) -> Iterator[Statement]:
+    """Statements on {α_i, α_j}, {β_i, β_j} and {α_i, β_j} up to ``degree`` − 1 in p."""
+    n = system.dimension
+    maps = [*realisation.alpha, *realisation.beta]
+    pairs = [(i, j) for j in range(n) for i in range(j)]
+    pulled = [
+        e
+        for m in (realisation.alpha, realisation.beta)
+        for e in substitute([system.poisson[i][j] for i, j in pairs], dict(zip(system.coordinates, m, strict=True)))
+    ]
+    parts = _Parts(system, [*maps, *pulled], degree)
+
+    def label(i: int, j: int, m: int) -> str:
+        return f"({system.coordinates[i]}, {system.coordinates[j]}) in degree {m}"
+
+    def decided(name: str, residuals: Iterator[tuple[str, Poly]]) -> Statement:
+        return decide_elements(f"bi-realisation up to degree {degree - 1} in p: {name}", parts.tower, residuals,
+                               system.positive, "degree by degree; approximate beyond")  # fmt: skip
+
+    def own(first: int, sign: int) -> Iterator[tuple[str, Poly]]:
+        for m in range(degree):
+            for k, (i, j) in enumerate(pairs, 2 * n + (len(pairs) if first else 0)):
+                yield label(i, j, m), parts.bracket(first + i, first + j, m) - parts.parts[k][m] * sign
+
+    yield decided("{α_i, α_j} = π_ij∘α", own(0, 1))
+    yield decided("{β_i, β_j} = −π_ij∘β", own(n, -1))
+    mixed = ((label(i, j, m), parts.bracket(i, n + j, m)) for m in range(degree) for i in range(n) for j in range(n))
+    yield decided("{α_i, β_j} = 0", mixed)
