@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from math import lcm
-from typing import Any
 
 from phigen.symbolic.expression import (
-    ONE,
     Expression,
-    fold,
     number,
     power,
     product,
@@ -24,18 +21,22 @@ from phigen.symbolic.expression import (
 from phigen.symbolic.tower import Poly, Tower, rational
 
 #: Terms of a formula that are shown unless all are asked for.
-SHOWN = 12
+SHOWN = 8
 
 #: Formulas with more nodes than this are not expanded to look for a shorter form.
 _LARGE = 400
 
 
+#: Factors (base, exponent), exponents positive or negative rational numbers.
+Monomial = tuple[tuple[Expression, Fraction], ...]
+
+
 @dataclass(frozen=True)
 class Formula:
-    """A formula as (common divisor, terms); ``hidden`` terms are left out."""
+    """Terms (coefficient, monomial) over a common divisor; ``hidden`` further terms are left out."""
 
     divisor: int
-    terms: tuple[tuple[Fraction, Expression], ...]  # coefficient, monomial
+    terms: tuple[tuple[Fraction, Monomial], ...]
     hidden: int = 0
 
     @property
@@ -44,15 +45,17 @@ class Formula:
         return len(self.terms) + self.hidden
 
     def __str__(self) -> str:
-        return self._joined([_monomial(m) for _, m in self.terms], _rational, " + … ({} terms)", "({})/{}")
+        return self._joined([_monomial(m) for _, m in self.terms], str, " + … ({} terms)", "({})/{}")
 
     def latex(self) -> str:
         """The formula in LaTeX."""
-        monomials = [latex(m) for _, m in self.terms]
+        monomials = [latex(product(power(b, e) for b, e in m)) for _, m in self.terms]
         dots = r" + \cdots \text{{ ({} terms)}}"
-        return self._joined(monomials, lambda c: _sympy().latex(c), dots, r"\frac{{1}}{{{1}}} \left( {0} \right)", " ")
+        return self._joined(monomials, lambda c: latex(number(c)), dots, r"\frac{{1}}{{{1}}} \left( {0} \right)", " ")
 
-    def _joined(self, monomials: list[str], written: Any, dots: str, quotient: str, times: str = "*") -> str:
+    def _joined(
+        self, monomials: list[str], written: Callable[[Fraction], str], dots: str, quotient: str, times: str = "*"
+    ) -> str:
         if not monomials:
             return "0"
         parts: list[str] = []
@@ -77,7 +80,7 @@ def of_polynomial(tower: Tower, element: Poly, most: int | None = SHOWN) -> Form
         divisor = 1
     shown = terms if most is None or len(terms) <= most + 1 else terms[:most]
     variables = [*(symbol(n) for n in tower.symbols), *(g.expression for g in tower.generators)]
-    listed = tuple((c * divisor, _power_product(variables, exponents)) for c, exponents in shown)
+    listed = tuple((c * divisor, _factors(variables, exponents)) for c, exponents in shown)
     return Formula(divisor, listed, len(terms) - len(shown))
 
 
@@ -98,9 +101,11 @@ def readable_latex(expressions: Sequence[Expression]) -> list[str]:
 
 def latex(e: Expression) -> str:
     """One expression in LaTeX, by sympy."""
+    import sympy
+
     from phigen.geometry.sympy_bridge import to_sympy
 
-    return str(_sympy().latex(to_sympy(e)))
+    return str(sympy.latex(to_sympy(e)))
 
 
 def with_plain_names(expressions: Sequence[Expression]) -> list[Expression]:
@@ -118,48 +123,26 @@ def _expanded(expressions: Sequence[Expression], most: int | None) -> Iterator[F
         yield of_polynomial(tower, tower.convert(e), most)
 
 
-def _power_product(variables: Sequence[Expression], exponents: Sequence[int]) -> Expression:
-    factors = [power(v, k) for v, k in zip(variables, exponents, strict=False) if k]
-    return product(factors) if factors else ONE
+def _factors(variables: Sequence[Expression], exponents: Sequence[int]) -> Monomial:
+    """Factors in the order of the variables; a variable that is a power itself contributes its base."""
+    found = []
+    for variable, k in zip(variables, exponents, strict=False):
+        if k and variable.op == "pow":
+            found.append((variable.args[0], variable.value * k))
+        elif k:
+            found.append((variable, Fraction(k)))
+    return tuple(found)
 
 
-def _monomial(e: Expression) -> str:
+def _monomial(factors: Monomial) -> str:
     """A product as text, negative powers in one denominator."""
-    above, below = [], []
-    for factor in _factors(e):
-        if factor.op == "pow" and factor.value < 0:
-            below.append(power(factor.args[0], -factor.value))
-        else:
-            above.append(factor)
-    top = "*".join(_atom(f) for f in above) or "1"
+    above = [_atom(power(b, e)) for b, e in factors if e > 0]
+    below = [_atom(power(b, -e)) for b, e in factors if e < 0]
+    top = "*".join(above) or "1"
     if not below:
         return top
-    bottom = "*".join(_atom(f) for f in below)
-    return f"{top}/{bottom}" if len(below) == 1 else f"{top}/({bottom})"
-
-
-def _factors(e: Expression) -> list[Expression]:
-    def visit(node: Expression, args: list[list[Expression]]) -> list[Expression]:
-        return args[0] + args[1] if node.op == "mul" else [node]
-
-    return fold([e], visit)[0]
+    return f"{top}/{below[0]}" if len(below) == 1 else f"{top}/({'*'.join(below)})"
 
 
 def _atom(e: Expression) -> str:
-    written = text(e)
-    return f"({written})" if e.op in ("add", "sub", "neg") else written
-
-
-def _rational(value: Fraction) -> str:
-    return str(value)
-
-
-def _sympy() -> Any:
-    import sympy
-
-    return sympy
-
-
-def as_number(value: Fraction) -> str:
-    """A rational number for reading: short, as a decimal if that is exact."""
-    return text(number(value)) if value.denominator > 10**4 or value.denominator == 1 else f"{float(value):g}"
+    return f"({text(e)})" if e.op in ("add", "sub", "neg", "mul") else text(e)

@@ -7,6 +7,7 @@ the compiler inside its functions.
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 from importlib import import_module
 from typing import Any
 
@@ -56,11 +57,17 @@ class Commands(click.Group):
         with formatter.section("Commands"):
             formatter.write_dl([(name, line) for name, (_, line) in COMMANDS.items()])
 
-    def main(self, *args: Any, standalone_mode: bool = True, **extra: Any) -> Any:
+    def main(  # type: ignore[override]  # click's overloads tell only that standalone mode does not return
+        self,
+        args: Sequence[str] | None = None,
+        prog_name: str | None = None,
+        standalone_mode: bool = True,
+        **extra: Any,
+    ) -> Any:
         """Run a command and end the process with its exit code; see `phigen.errors` for the codes."""
         console = extra.setdefault("obj", Console())
         try:
-            done = super().main(*args, standalone_mode=False, **extra)
+            done = super().main(args, prog_name, standalone_mode=False, **extra)
             code = done if isinstance(done, int) else 0
         except Exception as error:
             code = report(error, console)

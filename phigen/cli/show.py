@@ -1,0 +1,192 @@
+"""``phigen show``: the formulas of one spec."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from phigen.cli.console import heading, out, verbosity
+from phigen.cli.sources import ORDER, load_one, one_spec
+
+if TYPE_CHECKING:
+    from phigen.analysis.formulas import Formula
+    from phigen.compiler import Compilation
+
+#: The leading term of the modified Hamiltonian costs one more coefficient of the series; beyond this it is left out.
+_MODIFIED_UP_TO = 6
+
+
+@click.command("show")
+@one_spec
+@click.option("--order", type=ORDER, help="Order of the method, instead of the spec's.")
+@click.option("--full", is_flag=True, help="All terms of long formulas.")
+@click.option("--latex", "as_latex", is_flag=True, help="The formulas as LaTeX, ready for \\input.")
+@click.option("--json", "as_json", is_flag=True, help="For machines: one object of texts.")
+@verbosity
+def command(spec_file: str, order: int | None, full: bool, as_latex: bool, as_json: bool) -> None:
+    """Show the formulas of a spec: π, Casimirs, α, β, S_1 … S_k, the modified Hamiltonian, operation counts."""
+    from phigen.analysis.formulas import SHOWN
+    from phigen.api import compilation_of
+
+    if as_latex and as_json:
+        raise click.UsageError("--latex and --json exclude one another")
+    compilation = compilation_of(load_one(spec_file), order)
+    if as_latex:
+        from phigen.analysis.latex import document
+
+        out(document(compilation, full=full))
+    elif as_json:
+        out(json.dumps(_described(compilation), indent=2, ensure_ascii=False))
+    else:
+        _print(compilation, None if full else SHOWN)
+
+
+def _print(compilation: Compilation, most: int | None) -> None:
+    spec, system = compilation.spec, compilation.system
+    out(heading(f"{spec.name}: {spec.title}" if spec.title else spec.name))
+    if system.parameters:
+        listed = ", ".join(f"{p.name} = {float(p.value):.9g}" + (" > 0" * p.positive) for p in system.parameters)
+        _section("Parameters", [listed])
+    _section(f"Poisson tensor: {system.shape}", _assignments(brackets(compilation)))
+    _section("Hamiltonian", _assignments([("H", readable_one(system.hamiltonian, most))]))
+    if system.casimirs:
+        _section("Casimirs", _assignments(_named(system.casimirs, most)))
+    if system.invariants:
+        _section("Invariants", _assignments(_named(system.invariants, most)))
+    _section(f"Bi-realisation: {compilation.realisation.explanation}", _assignments(_maps(compilation, most)))
+    _section(f"Generating function: {method(compilation)}", _assignments(_series(compilation, most)))
+    _section("Generated code", _code(compilation))
+
+
+def _section(title: str, lines: Sequence[str]) -> None:
+    out("\n" + heading(title))
+    for line in lines:
+        out(f"  {line}")
+
+
+def _assignments(pairs: Sequence[tuple[str, str]]) -> list[str]:
+    width = max((len(name) for name, _ in pairs), default=0)
+    return [f"{name:<{width}} = {value}" for name, value in pairs]
+
+
+def method(compilation: Compilation) -> str:
+    """``order 6 from S_1 … S_5, symmetric: the even terms vanish``."""
+    plan = compilation.order
+    terms = "S_1" if plan.terms == 1 else f"S_1 … S_{plan.terms}"
+    why = "symmetric, so the terms of even index vanish" if compilation.realisation.symmetric else "not symmetric"
+    note = f" ({plan.note})" if plan.note else ""
+    return f"order {plan.order} from {terms}; {why}{note}"
+
+
+def brackets(compilation: Compilation) -> list[tuple[str, str]]:
+    """The brackets of coordinates that are not 0."""
+    from phigen.analysis.formulas import readable
+
+    system = compilation.system
+    names, n = system.coordinates, system.dimension
+    pairs = [(i, j) for i in range(n) for j in range(i + 1, n) if not system.poisson[i][j].is_zero]
+    texts = readable([system.poisson[i][j] for i, j in pairs])
+    return [(f"{{{names[i]}, {names[j]}}}", t) for (i, j), t in zip(pairs, texts, strict=True)]
+
+
+def readable_one(expression: Any, most: int | None) -> str:
+    """One expression as text."""
+    from phigen.analysis.formulas import readable
+
+    return readable([expression], most)[0]
+
+
+def _named(formulas: Any, most: int | None) -> list[tuple[str, str]]:
+    return [(name, readable_one(e, most)) for name, e in formulas.items()]
+
+
+def _maps(compilation: Compilation, most: int | None) -> list[tuple[str, str]]:
+    """α and β; of a symmetric pair, α alone and what β is."""
+    from phigen.analysis.formulas import readable
+
+    realisation, names = compilation.realisation, compilation.system.coordinates
+    result = [(f"α_{c}", t) for c, t in zip(names, readable(realisation.alpha, most), strict=True)]
+    if realisation.symmetric:
+        return [*result, ("β(x, p)", "α(x, −p)")]
+    return result + [(f"β_{c}", t) for c, t in zip(names, readable(realisation.beta, most), strict=True)]
+
+
+def series_formulas(compilation: Compilation, most: int | None) -> tuple[list[tuple[int, Formula]], Formula | None]:
+    """The S_i that do not vanish, with their index; and −S_{p+1}, the leading term of the modified Hamiltonian.
+
+    The map of step h is the flow of H − h^p S_{p+1} + …, where p is the order and S the untruncated series.
+    """
+    from phigen.analysis.formulas import of_polynomial
+    from phigen.scheme.assemble import series_of
+
+    plan = compilation.order
+    more = plan.order <= _MODIFIED_UP_TO
+    series = series_of(compilation.system, compilation.realisation, plan.order + 1 if more else plan.terms)
+    listed = [(i, of_polynomial(series.tower, s, most)) for i, s in enumerate(series.terms[: plan.terms], 1) if s != 0]
+    return listed, of_polynomial(series.tower, -series.terms[plan.order], most) if more else None
+
+
+def _series(compilation: Compilation, most: int | None) -> list[tuple[str, str]]:
+    listed, correction = series_formulas(compilation, most)
+    pairs = [("S_h", " + ".join(f"h^{i} S_{i}" if i > 1 else "h S_1" for i, _ in listed))]
+    pairs += [(f"S_{i}", str(f)) for i, f in listed]
+    if correction is not None:
+        p = compilation.order.order
+        h = f"h^{p}" if p > 1 else "h"
+        if correction.size == 0:
+            pairs.append(("modified H", f"H, up to {h} at least"))
+        else:
+            pairs += [("modified H", f"H + {h} M + …"), ("M", str(correction))]
+    return pairs
+
+
+def _code(compilation: Compilation) -> list[str]:
+    program = compilation.program
+    lines = [fact for fact in program.facts if not fact.startswith("bi-realisation")]
+    counts = ", ".join(f"{n} {what}" for what, n in program.operations.items() if n)
+    lines.append(f"operations of one {program.driver_unit}: {counts}")
+    return lines + [f"{name}: {len(text.splitlines())} lines" for name, text in _files(compilation).items()]
+
+
+def _files(compilation: Compilation) -> dict[str, str]:
+    from phigen.cli.build import Options, generate
+
+    files: dict[str, str] = {}
+    for target in compilation.spec.targets:
+        files |= generate(compilation, target, Options())
+    return files
+
+
+def _described(compilation: Compilation) -> dict[str, object]:
+    from phigen.analysis.formulas import readable
+
+    system, realisation, plan = compilation.system, compilation.realisation, compilation.order
+    listed, correction = series_formulas(compilation, None)
+    return {
+        "name": compilation.spec.name,
+        "title": compilation.spec.title,
+        "coordinates": list(system.coordinates),
+        "parameters": {p.name: float(p.value) for p in system.parameters},
+        "structure": str(system.shape),
+        "poisson": [readable(row, None) for row in system.poisson],
+        "hamiltonian": readable_one(system.hamiltonian, None),
+        "casimirs": dict(_named(system.casimirs, None)),
+        "invariants": dict(_named(system.invariants, None)),
+        "birealisation": {
+            "kind": realisation.kind,
+            "symmetric": realisation.symmetric,
+            "explanation": realisation.explanation,
+            "reference": realisation.reference,
+            "alpha": readable(realisation.alpha, None),
+            "beta": readable(realisation.beta, None),
+        },
+        "order": plan.order,
+        "terms": plan.terms,
+        "series": {f"S_{i}": {"formula": str(f), "terms": f.size} for i, f in listed},
+        "modified_hamiltonian": None if correction is None else {"power": plan.order, "coefficient": str(correction)},
+        "operations": dict(compilation.program.operations),
+        "files": {name: len(text.encode()) for name, text in _files(compilation).items()},
+    }
