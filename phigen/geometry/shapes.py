@@ -62,6 +62,20 @@ class LiePoisson:
 
 
 @dataclass(frozen=True)
+class Affine:
+    """{x_i, x_j} = Σ_k c_ij^k x_k + b_ij, a Lie algebra with a cocycle b.
+
+    ``extension`` is the central extension by it: one more basis element z, the last, with [E_i, E_j] =
+    Σ_k c_ij^k E_k + b_ij z; π is its Lie–Poisson tensor at z = 1 (Jacobi is not checked here).
+    """
+
+    extension: LieAlgebra
+
+    def __str__(self) -> str:
+        return f"affine, {self.extension.name}"
+
+
+@dataclass(frozen=True)
 class General:
     """None of the other shapes."""
 
@@ -69,7 +83,7 @@ class General:
         return "general"
 
 
-Shape = Constant | Canonical | LogCanonical | LiePoisson | General
+Shape = Constant | Canonical | LogCanonical | LiePoisson | Affine | General
 
 
 def recognise(coordinates: Sequence[str], poisson: Matrix) -> Shape:
@@ -83,6 +97,7 @@ def recognise(coordinates: Sequence[str], poisson: Matrix) -> Shape:
         _constant(coordinates, entries, poisson)
         or _log_canonical(len(coordinates), entries)
         or _lie_poisson(coordinates, entries)
+        or _affine(coordinates, entries)
         or General()
     )
 
@@ -151,6 +166,19 @@ def _lie_poisson(coordinates: Sequence[str], entries: dict[tuple[int, int], Term
     n = len(coordinates)
     name = f"a Lie algebra of dimension {n}"
     return LiePoisson(LieAlgebra(name, n, constants, None, tuple(coordinates)))
+
+
+def _affine(coordinates: Sequence[str], entries: dict[tuple[int, int], Terms]) -> Shape | None:
+    constants: dict[tuple[int, int], dict[int, Expression]] = {}
+    n = len(coordinates)
+    for ij, terms in sorted(entries.items()):
+        if any(sum(exponents) > 1 for exponents in terms):
+            return None
+        row = {(*exponents, 1 - sum(exponents)).index(1): c for exponents, c in terms.items()}
+        if row:
+            constants[ij] = dict(sorted(row.items()))
+    name = f"a Lie algebra of dimension {n} with a cocycle"
+    return Affine(LieAlgebra(name, n + 1, constants, None, (*coordinates, "1")))
 
 
 def skew(upper: dict[tuple[int, int], Expression], n: int) -> Matrix:

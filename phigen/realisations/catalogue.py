@@ -4,16 +4,37 @@ from __future__ import annotations
 
 from phigen.errors import Diagnostic, SpecError
 from phigen.geometry.system import System
-from phigen.realisations import auto, canonical_euler, cayley, constant, custom, log_canonical
+from phigen.realisations import (
+    auto,
+    canonical_euler,
+    cayley,
+    constant,
+    custom,
+    exponential,
+    karasev,
+    log_canonical,
+    spray,
+)
 from phigen.realisations.protocol import BiRealisation, Builder
 from phigen.spec.model import BirealisationChoice
 
 BUILDERS: dict[str, Builder] = {
-    module.KIND: module.build for module in (auto, constant, canonical_euler, log_canonical, cayley, custom)
+    module.KIND: module.build
+    for module in (
+        auto,
+        constant,
+        canonical_euler,
+        log_canonical,
+        exponential,
+        cayley,
+        karasev,
+        spray,
+        custom,
+    )
 }
 
 #: Kinds of the spec format that a later version brings.
-PLANNED = ("exponential", "group-map", "karasev", "spray", "product", "pullback")
+PLANNED = ("group-map", "karasev", "product", "pullback")
 
 
 def realise(system: System, choice: BirealisationChoice | None = None) -> BiRealisation:
@@ -27,7 +48,7 @@ def realise(system: System, choice: BirealisationChoice | None = None) -> BiReal
         return _builder(choice.kind)(system, choice)
     except SpecError as error:
         place = system.locations.get(("birealisation",)) or system.locations.get(("poisson",))
-        raise SpecError(
+        raise type(error)(
             [Diagnostic(d.message, d.location or place, d.hint, d.source_line, d.severity) for d in error.diagnostics]
         ) from None
 

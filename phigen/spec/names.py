@@ -6,9 +6,11 @@ import re
 from collections.abc import Callable
 
 from phigen.symbolic.expression import FUNCTIONS
+from phigen.symbolic.special import SPECIAL
 
-#: Functions of expressions with their number of arguments; ``sign`` and ``power`` are phigen's own.
-SPEC_FUNCTIONS: dict[str, int] = {"sqrt": 1} | {f: n for f, n in FUNCTIONS.items() if f not in ("sign", "power")}
+#: Functions of expressions with their number of arguments; ``sign``, ``power`` and φ are phigen's own.
+_OWN = ("sign", "power", *SPECIAL)
+SPEC_FUNCTIONS: dict[str, int] = {"sqrt": 1} | {f: n for f, n in FUNCTIONS.items() if f not in _OWN}
 
 SPEC_NAME = r"[a-z][a-z0-9_]{0,30}"
 IDENTIFIER = r"[A-Za-z_][A-Za-z0-9_]*"
@@ -60,12 +62,13 @@ FAMILY_NAME = re.compile(r"([a-z]+)\(([1-9][0-9]{0,2})\)")
 
 #: Kinds of bi-realisation, and names from the design that later versions will offer. Building one of the
 #: planned ones means moving its name to the first table.
-BIREALISATIONS = ("auto", "constant", "canonical-euler", "log-canonical", "cayley", "custom")
+BIREALISATIONS = ("auto", "constant", "canonical-euler", "log-canonical", "cayley", "exponential", "spray", "custom")
 POISSON_FORMS = ("matrix", "brackets", "canonical", "log_canonical", "lie_algebra", "nambu")
+COMPOSITIONS = ("auto", "none", "suzuki", "triple-jump", "kahan-li", "yoshida")
 PLANNED: dict[str, tuple[str, ...]] = {
-    "birealisation": ("exponential", "group-map", "karasev", "spray", "product", "pullback"),
+    "birealisation": ("group-map", "karasev", "product", "pullback"),
     "poisson": ("product", "pullback"),
-    "composition": ("triple-jump", "suzuki", "yoshida", "kahan-li", "blanes-moan"),
+    "composition": ("blanes-moan",),
     "gauge": (),
     "scheme": (),
 }

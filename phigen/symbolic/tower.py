@@ -207,11 +207,11 @@ class Tower:
         phi = self._generator("phi0", [s])
         if order == 0:
             return phi
-        inverse = self._reciprocal(s)
-        slope = (s * phi**2 * Fraction(1, 2) - phi * Fraction(3, 2) + Fraction(1, 8)) * inverse
+        inverse = self._reciprocal(s) * self.constant(Fraction(1, 2))
+        slope = (s * phi**2 - 3 * phi + self.constant(Fraction(1, 4))) * inverse
         if order == 1:
             return slope
-        return (phi**2 * Fraction(1, 2) - slope * Fraction(5, 2) + s * phi * slope) * inverse
+        return (phi**2 - 5 * slope + 2 * s * phi * slope) * inverse
 
     def power(self, base: Poly, exponent: Fraction | int) -> Poly:
         """base ** exponent for a rational exponent."""

@@ -1,0 +1,100 @@
+"""Direct sums of Lie algebras that the basis hides, such as so(4) = so(3) ⊕ so(3) in its usual basis.
+
+The projections onto the summands commute with every ad_X, so they lie in the centroid, the linear maps T with
+T[X, Y] = [TX, Y]. A primary decomposition of the centroid's elements over Q finds them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+from typing import Any
+
+from flint import fmpq_mat, fmpq_poly
+
+from phigen.geometry.field import Scalar
+from phigen.geometry.lie_algebra import LieAlgebra
+from phigen.geometry.linear import kernel
+from phigen.symbolic.tower import rational
+
+#: Above this dimension the centroid, n² unknowns, is not computed.
+LARGEST = 12
+
+Rows = tuple[tuple[Fraction, ...], ...]
+
+
+def ideal_projections(algebra: LieAlgebra) -> list[Rows]:
+    """Projections e_1, …, e_r with Σ e_a = 1, e_a e_b = 0 onto ideals of which the algebra is the direct sum.
+
+    Row-major matrices in the basis E_i (column j is the image of E_j). One, the identity, if nothing finer was
+    found: structure constants with parameters, a large or an indecomposable algebra.
+    """
+    n = algebra.dimension
+    parts = [_identity(n)]
+    if n > LARGEST or not algebra.field.is_rational:
+        return [_rows(p) for p in parts]
+    for element in _centroid(algebra):
+        for idempotent in _idempotents(element):
+            parts = [q for p in parts for q in _refined(p, idempotent)]
+    return [_rows(p) for p in parts]
+
+
+def _refined(part: Any, idempotent: Any) -> list[Any]:
+    inside = part * idempotent
+    if inside != idempotent * part or inside * inside != inside:
+        return [part]
+    return [p for p in (inside, part - inside) if p.rank()]
+
+
+def _centroid(algebra: LieAlgebra) -> list[Any]:
+    """A basis of the maps T with T[E_i, E_j] = [TE_i, E_j] for all i, j."""
+    n, field = algebra.dimension, algebra.field
+    constants = [[{k: field.convert(c) for k, c in algebra.bracket(i, j).items()} for j in range(n)] for i in range(n)]
+    equations = []
+    for i in range(n):
+        for j in range(n):
+            rows: list[dict[int, Scalar]] = [{} for _ in range(n)]
+            for k, c in constants[i][j].items():  # T[E_i, E_j]: T_mk is unknown m·n + k
+                for m in range(n):
+                    rows[m][m * n + k] = rows[m].get(m * n + k, field.zero) + c
+            for a in range(n):  # [TE_i, E_j] = Σ_a T_ai [E_a, E_j]
+                for m, c in constants[a][j].items():
+                    rows[m][a * n + i] = rows[m].get(a * n + i, field.zero) - c
+            equations += [row for row in rows if row]
+    return [fmpq_mat(n, n, [v.get(m, field.zero) for m in range(n * n)]) for v in kernel(field, equations, n * n)]
+
+
+def _idempotents(element: Any) -> list[Any]:
+    """The projections onto the primary components of a matrix over Q; none if there is only one."""
+    minimal = element.minpoly()
+    _, factors = minimal.factor()
+    if len(factors) < 2:
+        return []
+    found = []
+    for factor, multiplicity in factors:
+        own = factor**multiplicity
+        rest = fmpq_poly(minimal / own)
+        _, _, cofactor = own.xgcd(rest)
+        found.append(_value(cofactor * rest, element))
+    return found
+
+
+def _value(polynomial: Any, matrix: Any) -> Any:
+    result = fmpq_mat(matrix.nrows(), matrix.ncols())
+    for c in reversed(polynomial.coeffs()):
+        result = result * matrix + _identity(matrix.nrows()) * c
+    return result
+
+
+def _identity(n: int) -> Any:
+    return fmpq_mat(n, n, [int(i == j) for i in range(n) for j in range(n)])
+
+
+def _rows(matrix: Any) -> Rows:
+    n = matrix.nrows()
+    return tuple(tuple(rational(matrix[i, j]) for j in range(n)) for i in range(n))
+
+
+def applied(rows: Sequence[Sequence[Fraction]], vector: Sequence[Any], zero: Any) -> list[Any]:
+    """The product of a matrix of rationals and a vector of expressions."""
+    return [sum((c * v for c, v in zip(row, vector, strict=True) if c), zero) for row in rows]

@@ -1,0 +1,157 @@
+"""The even part of b(M_p)x, b(z) = z/(1 − e^{−z}): Σ_{k≥1} B_{2k}/(2k)! M_p^{2k} x in closed form.
+
+M = M_p is the matrix with M_p x = π(x)p on the dual of a Lie algebra. With N = M² and φ as in
+`phigen.symbolic.special`, Σ B_{2k}/(2k)! M^{2k} = Nφ(−N), hence
+
+    N^k x = 0 for some k     a finite sum
+    N(N + s) = 0             N x φ(s)
+    N(N + s)² = 0            N (φ(s) x − φ'(s)(N + s) x),
+
+the last since φ(−N) = φ(s) − φ'(s)(N + s) up to (N + s)², which N annihilates. s is a quadratic polynomial in
+p: s = |p|² for so(3), where N = M² = p×(p×·); minus the discriminant for sl(2); |rotation|² for se(3). All is found
+from the structure constants: if −s is the only non-zero eigenvalue of N, of multiplicity m, then s = −tr N/m.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+
+from phigen.geometry.ideals import applied, ideal_projections
+from phigen.geometry.lie_algebra import LieAlgebra
+from phigen.geometry.representations import indecomposable_parts, restricted
+from phigen.symbolic.expression import ZERO, Expression, call, number, symbols_of, total
+from phigen.symbolic.special import coefficient
+from phigen.symbolic.tower import Poly, Tower
+
+#: Most terms of one component of M^k x in p and x that are worth looking at.
+MOST_TERMS = 20_000
+
+Vector = list[Expression]
+
+
+@dataclass(frozen=True)
+class EvenPart:
+    """``values``: Σ_{k≥1} B_{2k}/(2k)! M_p^{2k} x; ``forms``: which closed form holds on which part."""
+
+    values: tuple[Expression, ...]
+    forms: tuple[str, ...]
+
+
+def even_part(algebra: LieAlgebra, x: Sequence[Expression], p: Sequence[Expression]) -> EvenPart | None:
+    """The closed form for a point x of the dual and p in the algebra; None if none of the three applies.
+
+    Each summand of a direct sum has its own. x and p may be any expressions, e.g. constants in the components of
+    a central extension.
+    """
+    values: Vector = [ZERO] * algebra.dimension
+    forms: list[str] = []
+    for part in indecomposable_parts(algebra):
+        ideal = restricted(algebra, part)
+        if not ideal.constants:
+            continue
+        found = _of_ideal(ideal, [x[i] for i in part], [p[i] for i in part])
+        if found is None:
+            return None
+        for i, value in zip(part, found.values, strict=True):
+            values[i] = value
+        forms += found.forms
+    return EvenPart(tuple(values), tuple(forms))
+
+
+def _of_ideal(ideal: LieAlgebra, x: Vector, p: Vector) -> EvenPart | None:
+    """An ideal spanned by basis elements: as a whole, or by summands that the basis hides."""
+    found = _closed(ideal, x, p)
+    if found is not None:
+        return found
+    projections = ideal_projections(ideal)
+    if len(projections) < 2:
+        return None
+    # M_p = Σ M_{e_a p}, and M_{e_a p} M_{e_b p} = 0 for a ≠ b.
+    summands = [_closed(ideal, x, applied(e, p, ZERO)) for e in projections]
+    present = [s for s in summands if s is not None]
+    if len(present) < len(summands):
+        return None
+    values = tuple(total(column) for column in zip(*(s.values for s in present), strict=True))
+    return EvenPart(values, tuple(form for s in present for form in s.forms))
+
+
+def matrix_of(algebra: LieAlgebra, p: Sequence[Expression]) -> list[Vector]:
+    """M_p, (M_p)_ik = Σ_j c_ij^k p_j."""
+    n = range(algebra.dimension)
+    brackets = [[algebra.bracket(i, j) for j in n] for i in n]
+    return [
+        [total(brackets[i][j][k] * p[j] for j in n if k in brackets[i][j] and not p[j].is_zero) for k in n] for i in n
+    ]
+
+
+def times(matrix: Sequence[Sequence[Expression]], vector: Sequence[Expression]) -> Vector:
+    """The product, zero entries skipped."""
+    return [total(m * v for m, v in zip(row, vector, strict=True) if not (m.is_zero or v.is_zero)) for row in matrix]
+
+
+def _closed(algebra: LieAlgebra, x: Vector, p: Vector) -> EvenPart | None:
+    matrix = matrix_of(algebra, p)
+    flat = [m for row in matrix for m in row]
+    tower = Tower(symbols_of(*flat, *x), [*flat, *x])
+    if all(tower.is_zero(m) for m in tower.convert_all(flat)):
+        return EvenPart(tuple([ZERO] * len(x)), ())
+    s = _root(tower, matrix)
+    if s is None:
+        return None
+    if tower.is_zero(s):
+        return _nilpotent(tower, matrix, x)
+    return _semisimple(tower, matrix, x, s)
+
+
+def _root(tower: Tower, matrix: Sequence[Vector]) -> Poly | None:
+    """The s for which 0 and −s can be the only eigenvalues of M²; None if there is none."""
+    n = range(len(matrix))
+    flat = tower.convert_all([m for row in matrix for m in row])
+    m = [flat[i * len(matrix) : (i + 1) * len(matrix)] for i in n]
+    square = [[tower.combine(m[i][k] * m[k][j] for k in n if m[i][k] != 0 and m[k][j] != 0) for j in n] for i in n]
+    trace = tower.combine(square[i][i] for i in n)
+    of_square = tower.combine(square[i][j] * square[j][i] for i in n for j in n)
+    for multiplicity in range(1, len(matrix) + 1):
+        if tower.is_zero(of_square * multiplicity - trace * trace):
+            return trace * tower.constant(Fraction(-1, multiplicity))
+    return None
+
+
+def _nilpotent(tower: Tower, matrix: Sequence[Vector], x: Vector) -> EvenPart | None:
+    terms: list[Vector] = []
+    power = times(matrix, x)
+    for k in range(len(matrix)):
+        power = times(matrix, power)
+        if k % 2 == 0:  # N^{k/2+1} x
+            if _vanish(tower, power):
+                break
+            terms.append([number((-1) ** (k // 2) * coefficient(0, k // 2)) * v for v in power])
+    else:
+        return None
+    values = tuple(total(column) for column in zip(*terms, strict=True)) if terms else (ZERO,) * len(x)
+    return EvenPart(values, (f"nilpotent, a finite sum of {len(terms) + 1} terms",))
+
+
+def _semisimple(tower: Tower, matrix: Sequence[Vector], x: Vector, root: Poly) -> EvenPart | None:
+    s = tower.expression(root)
+    first = times(matrix, times(matrix, x))  # N x
+    rest = [a + s * b for a, b in zip(times(matrix, times(matrix, first)), first, strict=True)]  # (N + s) N x
+    simplest = f"φ(s), s = {_shown(s)}"
+    if _vanish(tower, rest):
+        return EvenPart(tuple(call("phi0", s) * v for v in first), (f"M⁴ = −s M², hence {simplest}",))
+    last = [a + s * b for a, b in zip(times(matrix, times(matrix, rest)), rest, strict=True)]
+    if not _vanish(tower, last):
+        return None
+    values = tuple(call("phi0", s) * v - call("phi1", s) * w for v, w in zip(first, rest, strict=True))
+    return EvenPart(values, (f"M²(M² + s)² = 0, hence φ(s) and φ'(s), s = {_shown(s)}",))
+
+
+def _vanish(tower: Tower, vector: Sequence[Expression]) -> bool:
+    return all(tower.is_zero(v) for v in tower.convert_all(vector))
+
+
+def _shown(s: Expression) -> str:
+    written = str(s).replace("p:", "p_")
+    return written if len(written) < 60 else "a quadratic form in p"
