@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TypeVar
 
@@ -52,7 +52,8 @@ def compile_spec(spec: Spec, *, order: int | None = None, system: System | None 
         return result
 
     source = timed("system", lambda: system or system_from_spec(spec))
-    realisation = timed("bi-realisation", lambda: realise(source, spec.birealisation))
+    choice = replace(spec.birealisation, order=order) if order else spec.birealisation
+    realisation = timed("bi-realisation", lambda: realise(source, choice))
     plan = plan_order(order or spec.order, None if order else spec.terms, symmetric=realisation.symmetric)
     program = timed(
         "program",
@@ -60,6 +61,7 @@ def compile_spec(spec: Spec, *, order: int | None = None, system: System | None 
             source,
             realisation,
             plan,
+            composition=spec.composition,
             solver=spec.solver,
             title=spec.title,
             licence=spec.license,

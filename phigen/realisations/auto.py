@@ -6,18 +6,15 @@ from dataclasses import replace
 
 from phigen.geometry.shapes import Canonical, Constant, LiePoisson, LogCanonical
 from phigen.geometry.system import System
-from phigen.realisations import cayley, constant, log_canonical
-from phigen.realisations.protocol import BiRealisation, refuse
+from phigen.realisations import cayley, constant, karasev, log_canonical
+from phigen.realisations.protocol import BiRealisation
 from phigen.spec.model import BirealisationChoice
 
 KIND = "auto"
 
 
 def build(system: System, choice: BirealisationChoice) -> BiRealisation:
-    """The bi-realisation that fits the shape of π; its ``explanation`` says what was picked and why.
-
-    Raises `SpecError`, saying what was tried, when no available kind applies.
-    """
+    """The bi-realisation that fits the shape of π; its ``explanation`` says what was picked and why."""
     match system.shape:
         case Constant() | Canonical():
             found = constant.build(system, choice)
@@ -26,9 +23,5 @@ def build(system: System, choice: BirealisationChoice) -> BiRealisation:
         case LiePoisson():
             found = cayley.build(system, choice)
         case _:
-            raise refuse(
-                "no available bi-realisation applies: π is not constant, not log-canonical and not linear",
-                "the kind karasev, which handles every smooth π, is planned; "
-                "a bi-realisation of your own can be given with kind: custom",
-            )
+            found = karasev.build(system, choice)
     return replace(found, explanation=f"auto picked {found.kind}, since {found.explanation}")

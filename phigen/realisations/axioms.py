@@ -23,9 +23,10 @@ from phigen.symbolic.verdict import Statement, decide_elements, decide_zero
 def check(system: System, realisation: BiRealisation) -> list[Statement]:
     """Statements on the unit, the three families of brackets, and the simplified forms used by the solver.
 
-    Of a truncation (``exact`` False) the brackets are stated, and proved, up to its degree less one.
+    Of a truncation (``exact`` False), and of the formal series of a path, the brackets are stated, and proved, up
+    to its degree less one.
     """
-    degree = None if realisation.exact else realisation.degree
+    degree = None if realisation.exact and not realisation.path else realisation.degree
     return [
         _unit(system, realisation),
         *(_brackets(system, realisation) if degree is None else truncated.brackets(system, realisation, degree)),

@@ -39,6 +39,7 @@ def build(system: System, choice: BirealisationChoice, *, degree: int = DEGREE) 
         tuple(b - a for a, b in zip(alpha, mirrored, strict=True)),
         symmetric=True,
         path=True,
+        degree=degree,
         explanation="Karasev's construction, which holds for every smooth π: each step follows the path ṁ = π(m)p "
         "to round-off; symmetric",
         reference=f"{PAPER}, section 3.2; M. V. Karasev, Math. USSR Izvestiya 28 (1987)",

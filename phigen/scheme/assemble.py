@@ -6,11 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
-from phigen.errors import Diagnostic, LimitError
+from phigen.errors import Diagnostic, LimitError, SpecError
 from phigen.geometry.shapes import LogCanonical
 from phigen.geometry.system import System
 from phigen.realisations import karasev
 from phigen.realisations.protocol import BiRealisation
+from phigen.scheme.composition import find, orders
 from phigen.scheme.generating import STEP, GeneratingFunction, collected_form, graph_form
 from phigen.scheme.lowering import cost, operation_counts
 from phigen.scheme.path import build_path
@@ -23,12 +24,18 @@ from phigen.scheme.step import (
     explicit_order,
     linearise,
 )
-from phigen.series.hamilton_jacobi import PolynomialSeries, graph_series, polynomial_series
+from phigen.series.hamilton_jacobi import PolynomialSeries, graph_series, momentum, polynomial_series
 from phigen.spec.model import SolverOptions
 from phigen.symbolic.expression import ONE, ZERO, Expression, number, total
 
 #: Most operations in one kernel; about 5 MB of C and a minute of compilation.
 MOST_OPERATIONS = 100_000
+
+#: Below this cost of gradient and Hessian no composition is considered.
+COMPOSE_ABOVE = 2_000
+
+#: A direct series may cost this many times a composition: its error constant is that much better.
+DIRECT_WORTH = 4
 
 DRIVERS = {
     "explicit": "explicit",
@@ -90,7 +97,7 @@ def series_of(system: System, realisation: BiRealisation, terms: int) -> Polynom
 
 
 def generating_function(system: System, realisation: BiRealisation, terms: int) -> GeneratingFunction:
-    """∇S_h and Hess S_h in the cheapest form."""
+    """∇S_h and Hess S_h in the cheapest form. LimitError if every form is too large."""
     coordinates, static, symmetric = system.coordinates, system.parameter_names, realisation.symmetric
     candidates = []
     if terms <= GRAPH_TERMS:
@@ -98,10 +105,60 @@ def generating_function(system: System, realisation: BiRealisation, terms: int) 
         graph = graph_series(system.hamiltonian, alpha, coordinates, terms, symmetric=symmetric)
         candidates.append(graph_form(graph, coordinates, static))
     worth = min((c.cost() for c in candidates), default=MOST_OPERATIONS)
-    candidates = [*collected_form(series_of(system, realisation, terms), coordinates, static, worth), *candidates]
-    if not candidates:
-        raise too_large(system, f"S_1 … S_{terms} have too many terms")
+    try:
+        series = series_of(system, realisation, terms)
+        candidates = [*collected_form(series, coordinates, static, worth), *candidates]
+    except OverflowError:
+        pass
+    if not candidates or min(c.cost() for c in candidates) > MOST_OPERATIONS:
+        raise too_large(system, f"S_1 … S_{terms} take more than {MOST_OPERATIONS} operations")
     return min(candidates, key=GeneratingFunction.cost)
+
+
+@dataclass(frozen=True)
+class Discretisation:
+    """How the order is reached: the terms of one stage, and the stages of a step."""
+
+    generating: GeneratingFunction
+    terms: int
+    fractions: tuple[float, ...] = (1.0,)
+    note: str = ""
+
+
+def discretise(system: System, realisation: BiRealisation, order: Order, composition: str) -> Discretisation:
+    """The direct series, or a symmetric composition of the method of order 2 where that was asked for or is cheaper.
+
+    ``auto`` composes only if the direct series is beyond the budget or costs more than `DIRECT_WORTH` times
+    the stages of a composition, since its error constant is much smaller.
+    """
+    if composition not in ("auto", "none"):
+        return _composed(system, realisation, order, composition)
+    possible = composition == "auto" and realisation.symmetric and find("auto", order.order) is not None
+    try:
+        direct = Discretisation(generating_function(system, realisation, order.terms), order.terms)
+    except LimitError:
+        if not possible:
+            raise
+        return _composed(system, realisation, order, "auto")
+    if not possible or direct.generating.cost() < COMPOSE_ABOVE:
+        return direct
+    composed = _composed(system, realisation, order, "auto")
+    price = DIRECT_WORTH * len(composed.fractions) * (composed.generating.cost() + system.dimension**2)
+    return composed if direct.generating.cost() > price else direct
+
+
+def _composed(system: System, realisation: BiRealisation, order: Order, name: str) -> Discretisation:
+    found = find(name, order.order)
+    if found is None or not realisation.symmetric:
+        reason = (
+            f"composition {name} offers the orders {orders(name)}, not {order.order}"
+            if realisation.symmetric
+            else f"composition {name} needs a symmetric bi-realisation; {realisation.kind} is not"
+        )
+        place = system.locations.get(("composition",)) or system.locations.get(("order",))
+        raise SpecError([Diagnostic(reason, place, "composition: none takes the series directly")])
+    note = f"composition: {found.name}, {len(found.fractions)} stages of order 2"
+    return Discretisation(generating_function(system, realisation, 1), 1, found.fractions, note)
 
 
 def build_program(
@@ -109,6 +166,7 @@ def build_program(
     realisation: BiRealisation,
     order: Order,
     *,
+    composition: str = "auto",
     solver: SolverOptions | None = None,
     title: str = "",
     licence: str = "0BSD",
@@ -116,7 +174,8 @@ def build_program(
 ) -> Program:
     """The solver of a system as a program. LimitError if a kernel exceeds `MOST_OPERATIONS`."""
     solver = solver or SolverOptions()
-    generating = generating_function(system, realisation, order.terms)
+    scheme = discretise(system, realisation, order, composition)
+    generating = scheme.generating
     coefficients = generating.coefficients
     path = build_path(system, coefficients) if realisation.path else None
     if path:
@@ -136,7 +195,8 @@ def build_program(
         _within_budget(kernel, system)
     facts = [
         f"bi-realisation: {realisation.kind}, {'symmetric' if realisation.symmetric else 'not symmetric'}",
-        f"generating function: S_1 ... S_{order.terms} ({generating.form}"
+        *approximation(realisation),
+        f"generating function: {'S_1' if scheme.terms == 1 else f'S_1 ... S_{scheme.terms}'} ({generating.form}"
         + (f", {generating.terms} terms)" if generating.terms else ")"),
         f"step: {DRIVERS[driver]}",
     ]
@@ -151,15 +211,26 @@ def build_program(
         coefficients=len(coefficients.values),
         kernels={"prepare": prepare, **kernels},
         path=path,
+        fractions=scheme.fractions,
         relative=isinstance(system.shape, LogCanonical),
         symmetric=realisation.symmetric,
         max_iterations=solver.max_iterations,
         tolerance=1e-17 if solver.tolerance is None else float(solver.tolerance),
         license=licence,
         spec_sha256=spec_sha256,
-        facts=tuple([*facts, order.note] if order.note else facts),
+        facts=tuple(fact for fact in (*facts, scheme.note, order.note) if fact),
         operations=operation_counts(main.roots),
     )
+
+
+def approximation(realisation: BiRealisation) -> list[str]:
+    """The line that labels a solver built on a truncation; none for an exact bi-realisation."""
+    if realisation.exact:
+        return []
+    degree = realisation.degree
+    how = "" if degree is None else f": alpha and beta are cut off at degree {degree} in p"
+    rate = "" if degree is None else f", up to O(h^{degree + 1}) a step"
+    return [f"approximate{how}; it is a Poisson map and keeps Casimirs only approximately{rate}"]
 
 
 def _within_budget(kernel: Kernel, system: System) -> None:
@@ -201,7 +272,7 @@ def _step_kernels(
     flat = coefficients.hoist(flat)
     sizes = (n, n, n * n, n * n)
     outputs = _outputs(flat, ("displacement", "increment", "jacobian", "increment_jacobian"), sizes)
-    named = tuple((f"p_{c}", e) for c, e in zip(coordinates, flat[sum(sizes) :], strict=True))
+    named = tuple((momentum(c), e) for c, e in zip(coordinates, flat[sum(sizes) :], strict=True))
     kernels = {
         "linearise": Kernel(
             "linearise",

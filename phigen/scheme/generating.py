@@ -51,11 +51,12 @@ def collected_form(
     tower, n = series.tower, len(coordinates)
     h = tower.variable(STEP)
     s = tower.combine(term * h ** (i + 1) for i, term in enumerate(series.terms))
+    worth = max(worth, 200)
     if len(s) > 10 * worth:  # many terms may share a monomial in the coordinates, but not that many
         return []
     ring, (terms,) = collect(tower, [s], coordinates)
     first = [ring.derivative(terms, j) for j in range(n)]
-    if sum(len(g) for g in first) > max(worth, 200):
+    if sum(len(g) for g in first) > worth:
         return []
     found = []
     for entrywise in (True, False):

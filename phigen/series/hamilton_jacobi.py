@@ -10,7 +10,7 @@ The S_i of the paper (section 4, step 1) carry a further factor i!. In a symmetr
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Sequence, Sized
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
@@ -18,6 +18,10 @@ from typing import Any
 from phigen.symbolic.expression import ZERO, Expression, gradient, substitute
 from phigen.symbolic.taylor import ExpressionRing, Taylor, closure
 from phigen.symbolic.tower import Poly, Tower
+
+
+#: A term S_i with more monomials than this ends the recursion: the next would take minutes.
+MOST_TERMS = 50_000
 
 
 @dataclass(frozen=True)
@@ -53,7 +57,10 @@ def polynomial_series(
     *,
     symmetric: bool,
 ) -> PolynomialSeries:
-    """S_1 … S_terms in a tower (exact rational arithmetic, parameters symbolic)."""
+    """S_1 … S_terms in a tower (exact rational arithmetic, parameters symbolic).
+
+    Raises `OverflowError` if a term has more than `MOST_TERMS` monomials.
+    """
     target = composed(hamiltonian, coordinates, alpha)
     tower = series_tower(target, coordinates, parameters)
 
@@ -93,6 +100,8 @@ def _recursion(
         skip = symmetric and i % 2 == 0
         taylor.advance(dict(zip(momenta, [zero] * len(momenta) if skip else slope(found[-1]), strict=True)))
         even = symmetric and i % 2 == 1
+        if isinstance(found[-1], Sized) and len(found[-1]) > MOST_TERMS:
+            raise OverflowError(f"S_{i} has {len(found[-1])} terms")
         found.append(zero if even else taylor.coefficients(target)[i] * ring.constant(Fraction(1, i + 1)))
     return found
 

@@ -21,6 +21,7 @@ from phigen.spec.kinds import (
 from phigen.spec.names import (
     BIREALISATIONS,
     CLASSICAL_METHODS,
+    COMPOSITIONS,
     FAMILY_HELP,
     IDENTIFIER,
     PLANNED,
@@ -84,6 +85,7 @@ POISSON = Record(
     planned=PLANNED["poisson"],
 )
 KIND = Choice(BIREALISATIONS, PLANNED["birealisation"])
+SPRAY = Either({Scalar: Choice(("auto", "flat", "natural")), Sequence: ListOf(FORMULA, least=1)})
 BIREALISATION = Record(
     "birealisation",
     (
@@ -91,6 +93,8 @@ BIREALISATION = Record(
         Field("side", Choice(("q", "p")), "which half canonical-euler takes implicitly", default="q"),
         Field("alpha", ListOf(FORMULA, least=1), "custom: α(x, p), one expression per coordinate, momenta are p_NAME"),
         Field("beta", ListOf(FORMULA, least=1), "custom: β(x, p), one expression per coordinate, momenta are p_NAME"),
+        Field("spray", SPRAY, "spray: the quadratic forms f_j of ṗ_j, or the name of a spray", default="auto"),
+        Field("degree", Integer(1, limits.ORDER, limit=True), "spray: where formal series in p are cut off"),
     ),
 )
 SOLVER = Record(
@@ -159,7 +163,7 @@ SPEC = Record(
         ),
         Field("order", Integer(1, limits.ORDER, limit=True), "order of the method", default=4),
         Field("terms", Integer(1, limits.ORDER, limit=True), "instead of order: use exactly S_1, …, S_k"),
-        Field("composition", _switch("composition", "auto", "none"), "symmetric composition of steps", default="auto"),
+        Field("composition", _switch("composition", *COMPOSITIONS), "symmetric composition of steps", default="auto"),
         Field(
             "gauge",
             Either({Scalar: _switch("gauge", "auto", "none"), Mapping: Unavailable()}),

@@ -129,7 +129,7 @@ class Spec:
     birealisation: BirealisationChoice = BirealisationChoice()
     order: int | None = None  # exactly one of order and terms is set
     terms: int | None = None
-    composition: str = "none"
+    composition: str = "auto"
     gauge: str = "none"
     scheme: str = "auto"
     solver: SolverOptions = SolverOptions()

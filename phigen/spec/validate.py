@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from typing import Any
 
@@ -19,6 +19,8 @@ from phigen.spec.yaml_source import Scalar, decode, read
 from phigen.symbolic.expression import ZERO, Expression, symbol
 
 DEFAULT_ORDER = 4
+#: Options of bi-realisations and the kind that each belongs to.
+OPTIONS = {"alpha": "custom", "beta": "custom", "side": "canonical-euler", "spray": "spray", "degree": "spray"}
 
 
 def validate(data: bytes, file: str) -> Spec:
@@ -50,8 +52,8 @@ def _parts(raw: Mapping[str, Any], declared: Declarations) -> dict[str, Any]:
         "birealisation": _birealisation(raw.get("birealisation", "auto"), declared),
         "order": raw.get("order", None if "terms" in raw else DEFAULT_ORDER),
         "terms": raw.get("terms"),
-        # Neither has anything to choose from yet, so that auto is none.
-        "composition": "none",
+        "composition": raw.get("composition", "auto"),
+        # There is nothing to choose from yet, so that auto is none.
         "gauge": "none",
         "scheme": raw.get("scheme", "auto"),
         "solver": _solver(raw.get("solver", {}), declared),
@@ -95,32 +97,51 @@ def _license(given: str, declared: Declarations) -> str:
 def _birealisation(given: str | Mapping[str, Any], declared: Declarations) -> BirealisationChoice:
     options = {"kind": given} if isinstance(given, str) else given
     kind = options.get("kind", "")
-    for key, owner in (("alpha", "custom"), ("beta", "custom"), ("side", "canonical-euler")):
+    for key, owner in OPTIONS.items():
         location = declared.reader.locations.get(("birealisation", key))
         if key in options and kind and kind != owner and location is not None:
             declared.reader.problems.add(f"birealisation: {key} belongs to the kind {owner}, not {kind}", location)
-    if kind != "custom":
-        return BirealisationChoice(kind=kind, side=options.get("side", "q"))
+    if kind == "custom":
+        return _custom(options, declared)
+    if kind == "spray":
+        return _spray(options, declared)
+    return BirealisationChoice(kind=kind, side=options.get("side", "q"))
+
+
+def _custom(options: Mapping[str, Any], declared: Declarations) -> BirealisationChoice:
     for key in ("alpha", "beta"):
         if key not in options:
             place, hint = declared.reader.locations["birealisation",], "{kind: custom, alpha: […], beta: […]}"
             declared.reader.problems.add(f"birealisation: the kind custom needs {key}", place, hint)
-    return _custom(options, declared)
-
-
-def _custom(options: Mapping[str, Any], declared: Declarations) -> BirealisationChoice:
-    momenta = {f"p_{c}": symbol(f"p:{c}") for c in declared.coordinates}
-    for name in momenta.keys() & declared.nodes.keys():
-        message = f"the name {name!r} means the momentum of {name[2:]!r} in a custom bi-realisation"
-        declared.reader.error(declared.nodes[name], message, "choose another name")
-    n, scope, halves = len(declared.coordinates), declared.scope(momenta), {}
-    for key in ("alpha", "beta"):
-        nodes = options.get(key, ())
-        if len(nodes) != n and key in options and not declared.incomplete:
-            message = f"birealisation: {key} has {counted(len(nodes), 'expression')} for {counted(n, 'coordinate')}"
-            declared.reader.problems.add(message, declared.reader.locations["birealisation", key])
-        halves[key] = tuple(declared.formula(node, scope) or ZERO for node in nodes)
+    halves = _on_covectors(
+        {key: options.get(key, ()) for key in ("alpha", "beta")}, "a custom bi-realisation", declared
+    )
     return BirealisationChoice(kind="custom", alpha=halves["alpha"], beta=halves["beta"])
+
+
+def _spray(options: Mapping[str, Any], declared: Declarations) -> BirealisationChoice:
+    given = options.get("spray", "auto")
+    if not isinstance(given, str):
+        given = _on_covectors({"spray": given}, "a spray", declared)["spray"]
+    return BirealisationChoice(kind="spray", spray=given, degree=options.get("degree"))
+
+
+def _on_covectors(
+    lists: Mapping[str, Sequence[Scalar | None]], where: str, declared: Declarations
+) -> dict[str, tuple[Expression, ...]]:
+    """Lists of n expressions in the coordinates and ``p_NAME``, by the key of the bi-realisation that holds them."""
+    momenta = {f"p_{c}": symbol(f"p:{c}") for c in declared.coordinates}
+    for name in [c for c in momenta if c in declared.nodes]:
+        message = f"the name {name!r} means the momentum of {name[2:]!r} in {where}"
+        declared.reader.error(declared.nodes[name], message, "choose another name")
+    n, scope, found = len(declared.coordinates), declared.scope(momenta), {}
+    for key, nodes in lists.items():
+        place = declared.reader.locations.get(("birealisation", key))
+        if len(nodes) != n and place is not None and not declared.incomplete:
+            message = f"birealisation: {key} has {counted(len(nodes), 'expression')} for {counted(n, 'coordinate')}"
+            declared.reader.problems.add(message, place)
+        found[key] = tuple(declared.formula(node, scope) or ZERO for node in nodes)
+    return found
 
 
 def _solver(given: Mapping[str, Any], declared: Declarations) -> SolverOptions:

@@ -1,0 +1,74 @@
+"""Symmetric compositions: a step of high order from steps of a symmetric method of order 2.
+
+Φ_h = φ_{γ_s h} ∘ … ∘ φ_{γ_1 h} with γ_i = γ_{s+1−i}. A composition of Poisson maps is a Poisson map, and one of
+symmetric methods with symmetric coefficients is symmetric. Coefficients as in E. Hairer, C. Lubich, G. Wanner,
+Geometric Numerical Integration, 2nd ed., section V.3.2, where their authors are named.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+# The first half of each, and the middle coefficient last; the middle follows from Σ γ_i = 1.
+_YOSHIDA_6 = (0.78451361047755726381949763, 0.23557321335935813368479318, -1.17767998417887100694641568)
+_KAHAN_LI_6 = (
+    0.39216144400731413927925056,
+    0.33259913678935943859974864,
+    -0.70624617255763935980996482,
+    0.08221359629355080023149045,
+)
+_SUZUKI_UMENO_8 = (
+    0.74167036435061295344822780,
+    -0.40910082580003159399730010,
+    0.19075471029623837995387626,
+    -0.57386247111608226665638773,
+    0.29906418130365592384446354,
+    0.33462491824529818378495798,
+    0.31529309239676659663205666,
+)
+_KAHAN_LI_8 = (
+    0.13020248308889008087881763,
+    0.56116298177510838456196441,
+    -0.38947496264484728640807860,
+    0.15884190655515560089621075,
+    -0.39590389413323757733623154,
+    0.18453964097831570709183254,
+    0.25837438768632204729397911,
+    0.29501172360931029887096624,
+)
+
+
+@dataclass(frozen=True)
+class Composition:
+    """A named composition: the fractions γ_1 … γ_s of the step, and the order it gives."""
+
+    name: str
+    order: int
+    fractions: tuple[float, ...]
+
+
+def _symmetric(name: str, order: int, half: tuple[float, ...]) -> Composition:
+    return Composition(name, order, (*half, 1.0 - 2.0 * sum(half), *reversed(half)))
+
+
+#: All compositions, the recommended one of each order first.
+COMPOSITIONS = (
+    _symmetric("suzuki", 4, (1 / (4 - 4 ** (1 / 3)),) * 2),
+    _symmetric("triple-jump", 4, (1 / (2 - 2 ** (1 / 3)),)),
+    _symmetric("kahan-li", 6, _KAHAN_LI_6),
+    _symmetric("yoshida", 6, _YOSHIDA_6),
+    _symmetric("kahan-li", 8, _KAHAN_LI_8),
+    _symmetric("yoshida", 8, _SUZUKI_UMENO_8),
+)
+
+NAMES = ("suzuki", "triple-jump", "kahan-li", "yoshida")
+
+
+def find(name: str, order: int) -> Composition | None:
+    """The composition of that name (``auto``: the recommended one) and order, or None."""
+    return next((c for c in COMPOSITIONS if c.order == order and name in ("auto", c.name)), None)
+
+
+def orders(name: str) -> list[int]:
+    """The orders that a name offers."""
+    return [c.order for c in COMPOSITIONS if name in ("auto", c.name)]
