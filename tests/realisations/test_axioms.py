@@ -210,4 +210,6 @@ def test_casimirs_of_the_realisations_agree():
                 substitute([casimir], dict(zip(s.coordinates, maps, strict=True)))[0]
                 for maps in (realisation.alpha, realisation.beta)
             ]
-            assert decide_zero("C∘α = C∘β", [("", images[0] - images[1])]).verdict == PROVED
+            # exp(a)·exp(b)·exp(−a−b) = 1 is beyond the ring: the log-canonical one is checked at points.
+            expected = PROVED if s.lie_algebra else CHECKED
+            assert decide_zero("C∘α = C∘β", [("", images[0] - images[1])]).verdict == expected

@@ -32,12 +32,10 @@ def test_auto_picks_by_shape_and_explains(coordinates, poisson, kind):
     assert found.reference
 
 
-def test_auto_refuses_a_general_tensor_and_names_what_is_planned():
-    with pytest.raises(SpecError, match="not constant, not log-canonical and not linear") as caught:
-        realise(system("x y", "{brackets: {x: {y: 1 + x*y}}}"))
-    diagnostic = caught.value.diagnostics[0]
-    assert "karasev" in diagnostic.hint
-    assert diagnostic.location.line == 4  # of poisson, for lack of a birealisation
+def test_refusals_carry_the_place_in_the_spec():
+    with pytest.raises(SpecError) as caught:
+        realise(system("x y z", "{lie_algebra: {name: so(3)}}"), BirealisationChoice("constant"))
+    assert caught.value.diagnostics[0].location.line == 4  # of poisson, for lack of a birealisation
 
 
 @pytest.mark.parametrize("kind", PLANNED)

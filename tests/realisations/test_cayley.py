@@ -87,7 +87,8 @@ def test_parts_may_be_interleaved_and_of_different_kinds():
     "brackets",
     [
         "{x: {y: -z/I3, z: y/I2}, y: {z: -x/I1}}",  # so(3) with moments of inertia
-        "{x: {y: I1*y + I2*z, z: I3*z}}",  # solvable, book algebra
+        "{x: {y: I1*y, z: I1*z}}",  # book algebra
+        "{x: {y: I1*y, z: -I1*z}}",  # se(1, 1)
         "{x: {y: I1*z}}",  # Heisenberg, scaled
         "{x: {y: 2*I1*y, z: -2*I1*z}, y: {z: x/I2}}",  # sl(2), scaled
         "{x: {y: sqrt(I1)*z, z: -y}}",  # se(2) with a function of a parameter
@@ -95,6 +96,12 @@ def test_parts_may_be_interleaved_and_of_different_kinds():
 )
 def test_algebras_with_parameters_in_their_constants(brackets):
     assert proved(system("x y z", f"{{brackets: {brackets}}}", extra="parameters: {I1: 2, I2: 3, I3: 5}"))
+
+
+def test_solvable_algebra_with_unequal_weights_is_refused():
+    # (xA)³ is a multiple of A only if the weights have one modulus; the exponential chart has no such condition.
+    message = refusal(system("x y z", "{brackets: {x: {y: y, z: 2*z}}}"))
+    assert "in the adjoint 3×3 matrices, x·x·x leaves the algebra" in message
 
 
 def test_two_step_nilpotent_algebras_need_no_family():
