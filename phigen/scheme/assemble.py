@@ -196,7 +196,6 @@ def build_program(
     facts = [
         f"bi-realisation: {realisation.kind}, {'symmetric' if realisation.symmetric else 'not symmetric'}",
         *approximation(realisation),
-        *approximation(realisation),
         f"generating function: {'S_1' if scheme.terms == 1 else f'S_1 ... S_{scheme.terms}'} ({generating.form}"
         + (f", {generating.terms} terms)" if generating.terms else ")"),
         f"step: {DRIVERS[driver]}",
@@ -222,16 +221,6 @@ def build_program(
         facts=tuple(fact for fact in (*facts, scheme.note, order.note) if fact),
         operations=operation_counts(main.roots),
     )
-
-
-def approximation(realisation: BiRealisation) -> list[str]:
-    """The line that labels a solver built on a truncation; none for an exact bi-realisation."""
-    if realisation.exact:
-        return []
-    degree = realisation.degree
-    how = "" if degree is None else f": alpha and beta are cut off at degree {degree} in p"
-    rate = "" if degree is None else f", up to O(h^{degree + 1}) a step"
-    return [f"approximate{how}; it is a Poisson map and keeps Casimirs only approximately{rate}"]
 
 
 def approximation(realisation: BiRealisation) -> list[str]:

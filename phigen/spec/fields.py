@@ -86,7 +86,6 @@ POISSON = Record(
 )
 KIND = Choice(BIREALISATIONS, PLANNED["birealisation"])
 SPRAY = Either({Scalar: Choice(("auto", "flat", "natural")), Sequence: ListOf(FORMULA, least=1)})
-SPRAY = Either({Scalar: Choice(("auto", "flat", "natural")), Sequence: ListOf(FORMULA, least=1)})
 BIREALISATION = Record(
     "birealisation",
     (
@@ -94,8 +93,6 @@ BIREALISATION = Record(
         Field("side", Choice(("q", "p")), "which half canonical-euler takes implicitly", default="q"),
         Field("alpha", ListOf(FORMULA, least=1), "custom: α(x, p), one expression per coordinate, momenta are p_NAME"),
         Field("beta", ListOf(FORMULA, least=1), "custom: β(x, p), one expression per coordinate, momenta are p_NAME"),
-        Field("spray", SPRAY, "spray: the quadratic forms f_j of ṗ_j, or the name of a spray", default="auto"),
-        Field("degree", Integer(1, limits.ORDER, limit=True), "spray: where formal series in p are cut off"),
         Field("spray", SPRAY, "spray: the quadratic forms f_j of ṗ_j, or the name of a spray", default="auto"),
         Field("degree", Integer(1, limits.ORDER, limit=True), "spray: where formal series in p are cut off"),
     ),

@@ -21,8 +21,6 @@ from phigen.symbolic.expression import ZERO, Expression, symbol
 DEFAULT_ORDER = 4
 #: Options of bi-realisations and the kind that each belongs to.
 OPTIONS = {"alpha": "custom", "beta": "custom", "side": "canonical-euler", "spray": "spray", "degree": "spray"}
-#: Options of bi-realisations and the kind that each belongs to.
-OPTIONS = {"alpha": "custom", "beta": "custom", "side": "canonical-euler", "spray": "spray", "degree": "spray"}
 
 
 def validate(data: bytes, file: str) -> Spec:
