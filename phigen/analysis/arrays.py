@@ -19,8 +19,10 @@ _NAMES = {
 
 
 def evaluate(roots: Sequence[Expression], values: Mapping[str, Any]) -> list[Floats]:
-    """The roots for arrays (or numbers) of the symbols; NaN or infinity outside the domain. KeyError for a symbol
-    without value."""
+    """The roots for arrays (or numbers) of the symbols; NaN or infinity outside the domain.
+
+    Raises `KeyError` for a symbol without value.
+    """
 
     def visit(node: Expression, args: list[Any]) -> Any:
         match node.op:
@@ -39,9 +41,7 @@ def evaluate(roots: Sequence[Expression], values: Mapping[str, Any]) -> list[Flo
             case "mul":
                 return args[0] * args[1]
             case "pow":
-                return (
-                    np.float64(args[0]) ** float(node.value) if np.isscalar(args[0]) else args[0] ** float(node.value)
-                )
+                return np.power(args[0], float(node.value))
             case "power":
                 return np.power(args[0], args[1])
         return getattr(np, _NAMES.get(node.op, node.op))(*args)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -52,14 +52,14 @@ class Summary:
     final: tuple[float, ...]
     good: int
     rows: int
-    facts: Mapping[str, Any] = field(default_factory=dict)
 
 
 def summarise(
     method: str, system: System, run: Run | None, parameters: Mapping[str, float], t: Floats, x: Floats
 ) -> Summary:
     """The summary of states ``x`` (rows, DIM) at times ``t``, all quantities evaluated from their formulas."""
-    good = int(np.argmin(np.isfinite(x).all(axis=1))) or len(x)
+    rows = len(x)
+    good = int(np.argmin(np.isfinite(x).all(axis=1))) or rows
     t, x = t[:good], x[:good]
     values: dict[str, Any] = {**parameters, **{c: x[:, i] for i, c in enumerate(system.coordinates)}}
     scale = float(np.max(np.abs(x[0]), initial=0.0))
@@ -76,7 +76,7 @@ def summarise(
         exact=_against_exact(system, run, parameters, t, x) if run and run.exact else None,
         final=tuple(x[-1].tolist()),
         good=good,
-        rows=len(x) if good == len(x) else good,
+        rows=rows,
     )
 
 
