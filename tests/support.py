@@ -7,7 +7,7 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import cache, lru_cache
+from functools import cache
 from typing import Any
 
 import mpmath
@@ -43,10 +43,20 @@ def compiled(name: str, order: int | None = None) -> Compilation:
     return compile_spec(spec.load(resources.bundled_specs() / f"{name}.yaml"), order=order)
 
 
-@lru_cache(maxsize=256)
+_made: dict[tuple[Any, ...], tuple[Compilation, Any]] = {}
+
+
+def _once(compilation: Compilation, key: str, make: Callable[[], Any]) -> Any:
+    """What was made of a compilation before, which is kept alive with it; compilations cannot be hashed."""
+    place = (key, id(compilation))
+    if place not in _made:
+        _made[place] = compilation, make()
+    return _made[place][1]
+
+
 def files(compilation: Compilation, target: str) -> Mapping[str, str]:
     """The generated files."""
-    return emit(compilation.program, target, COMMAND)
+    return _once(compilation, f"files {target}", lambda: emit(compilation.program, target, COMMAND))
 
 
 def interface(compilation: Compilation) -> Interface:
@@ -62,9 +72,12 @@ def interface(compilation: Compilation) -> Interface:
     )
 
 
-@lru_cache(maxsize=256)
 def solver(compilation: Compilation, target: str) -> Solver:
     """A solver of one target; compiled C comes from the cache."""
+    return _once(compilation, f"solver {target}", lambda: _solver(compilation, target))
+
+
+def _solver(compilation: Compilation, target: str) -> Solver:
     names = interface(compilation)
     if target == "c":
         return Solver(CSolver.compile(files(compilation, "c"), names), names)
@@ -204,7 +217,28 @@ def _value(e: Expression, args: list[Any], at: Mapping[str, Any]) -> Any:
             return abs(args[0])
         case "sign":
             return mpmath.sign(args[0])
+        case "phi0" | "phi1" | "phi2":
+            return _phi(int(e.op[3:]), args[0])
     return getattr(mpmath, e.op)(*args)
+
+
+def _phi(order: int, s: Any) -> Any:
+    """φ(s) = (1 − w cot w)/s, w = √s/2, or a derivative: from its Taylor coefficients 2ζ(2n+2)/(4π²)^(n+1) near 0."""
+    if abs(s) > 12:
+
+        def closed(u: Any) -> Any:
+            w = mpmath.sqrt(u) / 2
+            return (1 - w * mpmath.cot(w)) / u
+
+        with mpmath.extradps(20):
+            return mpmath.re(mpmath.diff(closed, mpmath.mpc(s), order))
+    result, n = mpmath.mpf(0), 0
+    while True:
+        power = n + order + 1
+        term = 2 * mpmath.zeta(2 * power) / (4 * mpmath.pi**2) ** power * mpmath.rf(n + 1, order) * s**n
+        result, n = result + term, n + 1
+        if abs(term) <= mpmath.eps * abs(result):
+            return result
 
 
 class PreciseStep:

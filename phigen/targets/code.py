@@ -53,7 +53,7 @@ def parts(code: Code, size: int) -> list[Code]:
     ready: dict[int, list[Store]] = {}
     for s in code.stores:
         ready.setdefault(max((position.get(n, 0) for n in _reads([s.value])), default=0), []).append(s)
-    statements: list[Assignment | Store] = []
+    statements: list[Assignment | Store] = [] if code.assignments else list(code.stores)
     for k, a in enumerate(code.assignments):
         statements += [a, *ready.get(k, [])]
     chunks = [statements[i : i + size] for i in range(0, len(statements), size)]

@@ -26,7 +26,7 @@ C_RESERVED = frozenset((_C + " " + _MACROS + " " + _LIBM).split())
 _PYTHON = """False None True and as assert async await break class continue def del elif else except finally for from
 global if import in is lambda nonlocal not or pass raise return try while with yield match case type np abs
 print self DIM ORDER CASIMIRS DEFAULT_PARAMETERS StepError step integrate hamiltonian casimirs vector_field
-x0 steps stride parameters"""
+x0 steps stride parameters _filled _sum _values"""
 
 PYTHON_RESERVED = frozenset(_PYTHON.split())
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from phigen.scheme.program import Program
 from phigen.targets import special
-from phigen.targets.c.kernels import apart, function, member, printer, wrapped_arguments
+from phigen.targets.c.kernels import apart, function, members, printer, wrapped_arguments
 from phigen.targets.header import CHECKSUM, checksum, header_lines, plain
 from phigen.targets.path import Syntax, kinds, reads_coefficients, statements
 from phigen.targets.rendering import render
@@ -21,7 +21,8 @@ TERMS = 30
 def emit(program: Program, command: str, *, single_file: bool = False) -> dict[str, str]:
     """File names and their contents; with ``single_file`` only `NAME.c`, which then needs no header."""
     name = program.name
-    declarations = _render("header.h", _values(program))
+    values = _values(program)
+    declarations = _render("types.h", values) + "\n" + _render("functions.h", values)
     body = _body(program)
     if single_file:
         return {f"{name}.c": _sealed(program, command, declarations + "\n" + body)}
@@ -44,7 +45,7 @@ def _render(template: str, values: Mapping[str, object]) -> str:
 
 
 def _values(program: Program) -> dict[str, object]:
-    parameters = program.parameters
+    parameters, member = program.parameters, members(program)
     return {
         "NAME": program.name,
         "n": program.dimension,
@@ -64,7 +65,7 @@ def _values(program: Program) -> dict[str, object]:
         "coordinates": ", ".join(f"{c} = x[{i}]" for i, c in enumerate(program.coordinates)),
         "casimirs": ", ".join(f"{c} = out[{i}]" for i, c in enumerate(program.casimirs)) or "none",
         "members": [
-            (f"double {member(p.name)};", plain(p.description) or f"default {float(p.value)!r}") for p in parameters
+            (f"double {member[p.name]};", plain(p.description) or f"default {float(p.value)!r}") for p in parameters
         ]
         or [("char unused;", "this system has no parameters")],
         "defaults": ", ".join(repr(float(p.value)) for p in parameters) or "0",
@@ -80,10 +81,10 @@ def _signatures(program: Program) -> dict[str, list[str]]:
     """Signatures that are too long for one line with a long name."""
     name, n = program.name, program.dimension
     solver, params, status = f"{name}_solver *s", f"const {name}_params *params", f"{name}_status "
-    members = ["double *x", "size_t members", "double h", "size_t steps", "unsigned char *status"]
+    many = ["double *x", "size_t members", "double h", "size_t steps", "unsigned char *status"]
     return {
         "init": wrapped_arguments(f"{status}{name}_init(", [solver, params, f"const double x0[{n}]"]),
-        "ensemble": wrapped_arguments(f"{status}{name}_ensemble(", [params, *members]),
+        "ensemble": wrapped_arguments(f"{status}{name}_ensemble(", [params, *many]),
         "hamiltonian": wrapped_arguments(f"double {name}_hamiltonian(", [params, f"const double x[{n}]"]),
     }
 

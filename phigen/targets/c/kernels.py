@@ -29,9 +29,7 @@ LONGEST_FUNCTION = 200
 def function(program: Program, kernel: Kernel, *, exported: bool = False) -> str:
     """The C source of a kernel: one function, or a chain of static ones that share a workspace."""
     pieces = parts(lower(kernel), LONGEST_FUNCTION)
-    workspace = 1 + max(
-        (int(a.target[2:]) for p in pieces for a in p.assignments if a.target.startswith("w:")), default=-1
-    )
+    workspace = 1 + max((int(a.target[2:]) for p in pieces for a in p.assignments if a.target[:2] == "w:"), default=0)
     name = f"{program.name}_{kernel.name}"
     if len(pieces) == 1:
         return _definition(program, kernel, name, pieces[0], exported=exported)
@@ -42,6 +40,8 @@ def function(program: Program, kernel: Kernel, *, exported: bool = False) -> str
     arguments = ", ".join([*kernel.inputs, *(o.name for o in kernel.outputs), "work"])
     lines = [_comment(kernel.purpose), *_signature(program, kernel, name, exported=exported), "{"]
     lines.append(f"    double work[{workspace}];")
+    if exported and "params" in kernel.inputs:
+        lines.append(f"    if (params == NULL) params = &{program.name}_default_params;")
     lines += [f"    {name}_part{k}({arguments});" for k in range(1, len(pieces) + 1)]
     return "\n\n".join([*texts, "\n".join([*lines, "}"])])
 
@@ -99,6 +99,7 @@ def _body(program: Program, kernel: Kernel, code: Code, workspace: int, *, expor
     scope = Scope({*C_RESERVED, *arrays, *functions.values()})
     for f, name in functions.items():
         scope.bind(f, name)
+    member = members(program)
     lines: list[str] = []
     touched: set[str] = set()
     for array, symbols in kernel.inputs.items():
@@ -109,7 +110,7 @@ def _body(program: Program, kernel: Kernel, code: Code, workspace: int, *, expor
             if array == "h":
                 scope.bind(s, "h")
             elif array == "params":
-                scope.bind(s, f"params->{member(s)}")
+                scope.bind(s, f"params->{member[s]}")
             elif ":" in s:
                 scope.bind(s, f"{array}[{i}]")
             else:
@@ -142,9 +143,10 @@ def printer(scope: Scope) -> Printer:
     return Printer(lambda n: scope[n], FUNCTIONS, CONSTANTS, "pow")
 
 
-def member(name: str) -> str:
-    """The member of the parameter struct that holds a parameter."""
-    return Scope(C_RESERVED)[name]
+def members(program: Program) -> dict[str, str]:
+    """The members of the parameter struct, by the names of the parameters."""
+    scope = Scope(C_RESERVED)
+    return {p.name: scope[p.name] for p in program.parameters}
 
 
 def _comment(text: str) -> str:

@@ -59,8 +59,8 @@ def emit(program: Program, command: str) -> dict[str, str]:
         pieces += [_function(program, kernels["explicit"]), render("numpy", "explicit.py", _values(program))]
     elif program.path:
         path = _values(program) | statements(program, program.path, PATH_SYNTAX)
-        pieces += [_function(program, kernels["generate"]), render("numpy", "path.py", path)]
-        pieces += [render("numpy", "solve.py", path), render("numpy", "path_step.py", path)]
+        pieces += [_function(program, kernels["generate"])]
+        pieces += [render("numpy", f"{part}.py", path) for part in ("piece", "path", "residual", "solve", "path_step")]
     else:
         pieces += [_function(program, kernels["linearise"]), render("numpy", "solve.py", _values(program))]
         pieces += [render("numpy", "newton.py", _values(program))]

@@ -1,0 +1,126 @@
+"""Every operator, function and constant, rendered, compiled and evaluated for each target."""
+
+from dataclasses import replace
+from fractions import Fraction
+
+import mpmath
+import numpy as np
+import pytest
+from support import TARGETS, compile_text, solver, values
+
+from phigen.scheme.program import Kernel, Output
+from phigen.symbolic.expression import EULER, FUNCTIONS, ONE, PI, call, number, power, raw, symbol
+from phigen.symbolic.special import SPECIAL
+
+x, y, z = symbol("x"), symbol("y"), symbol("z")
+HALF = Fraction(1, 2)
+
+POINTS = np.array([[0.4, 0.7, 1.9], [0.013, 0.99, 12.5], [0.73, 0.25, 3.0]])  # x, y in (0, 1); z > 1
+
+#: Arguments that are in the domain of the function at every point.
+ARGUMENTS = dict.fromkeys(("exp", "sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh"), (-x,))
+ARGUMENTS |= {"asinh": (-z,), "acosh": (z,), "atanh": (-y,), "log": (x,), "abs": (y - z,), "sign": (x - y,)}
+ARGUMENTS |= {"atan2": (-x, y - z), "power": (z, y - 3 * x)}
+
+#: Arguments of φ and its derivatives: near 0, farther, and beyond 16, of either sign.
+SPECIAL_ARGUMENTS = {"near": x / 5, "near-": -x / 5, "far": 9 * z - 20 * y, "far-": 17 * x - 20 * z}
+
+EXPONENTS = [2, 3, -1, HALF, -HALF, Fraction(1, 3), Fraction(-3, 2), Fraction(5, 7)]
+EXPONENTS += [-2, -3, 7, 12, Fraction(2, 3), Fraction(-4, 3), Fraction(7, 2), Fraction(-5, 7)]
+
+NUMBERS = [Fraction(n) for n in (1, -1, 3, -7, 2**53 - 1, 2**53, 2**53 + 1, 10**22 + 1, -(10**39))]
+NUMBERS += [Fraction(1, 3), Fraction(-7, 11), Fraction(1, 1024), Fraction(123456789, 1000003), Fraction(10**7 + 1, 3)]
+NUMBERS += [Fraction(1, 10**39), Fraction(-1, 10**17), Fraction("0.1"), Fraction("-3.14159"), Fraction(2, 10**6 + 3)]
+
+#: Relative to the value. φ' and φ'' occur in Newton matrices and in what multiplies a last correction, nowhere else.
+BOUNDS = {"phi1": 1e-13, "phi2": 1e-13}
+
+
+def binary(op, a, b):
+    """A node exactly so, not simplified."""
+    return raw(op, (a, b))
+
+
+def cases():
+    """Names and expressions."""
+    for name in FUNCTIONS:
+        if name in SPECIAL:
+            yield from ((f"{name} {where}", call(name, e)) for where, e in SPECIAL_ARGUMENTS.items())
+        else:
+            yield name, call(name, *ARGUMENTS[name])
+    for exponent in EXPONENTS:
+        yield f"z**({exponent})", power(z, exponent)
+        yield f"(y+z)**({exponent})", power(y + z, exponent)
+    for exponent in (2, 3, -1, -2, 5):
+        yield f"(y-z)**({exponent})", power(y - z, exponent)
+        yield f"(-z)**({exponent})", raw("pow", (-z,), Fraction(exponent))
+    for value in NUMBERS:
+        yield f"{value}", number(value)
+        yield f"z*({value})", binary("mul", z, number(value))
+        yield f"({value})*z", binary("mul", number(value), z)
+        yield f"z-({value})", binary("sub", z, number(value))
+        yield f"({value})/z", binary("mul", number(value), power(z, -1))
+        yield f"z/({value})", binary("mul", z, raw("pow", (number(value),), Fraction(-1)))
+    yield from {"pi": PI, "E": EULER, "pi*x": PI * x, "E**y": call("power", EULER, y), "1": ONE}.items()
+    inner = {op: binary(op, x, y) for op in ("add", "sub", "mul")}
+    inner |= {"quotient": binary("mul", x, power(y, -1)), "reverse": binary("mul", power(y, -1), x)}
+    inner |= {"neg": -x, "square": x**2, "reciprocal": 1 / x, "third": number(Fraction(1, 3))}
+    for outer in ("add", "sub", "mul"):
+        for name, e in inner.items():
+            yield f"({name}) {outer} z", binary(outer, e, z)
+            yield f"z {outer} ({name})", binary(outer, z, e)
+            yield f"({name}) {outer} ({name})", binary(outer, e, binary("add", e, z))
+    for name, e in inner.items():
+        yield f"neg {name}", raw("neg", (e,))
+        yield f"neg neg {name}", raw("neg", (raw("neg", (e,)),))
+        yield f"1/({name})", raw("pow", (e,), Fraction(-1))
+        yield f"z/({name})", binary("mul", z, raw("pow", (e,), Fraction(-1)))
+        yield f"1/({name})/({name})", binary("mul", raw("pow", (e,), Fraction(-1)), raw("pow", (e,), Fraction(-1)))
+        yield f"({name})**2*z", binary("mul", raw("pow", (e,), Fraction(2)), z)
+        yield f"z/({name})**2", binary("mul", z, raw("pow", (raw("pow", (e,), Fraction(2)),), Fraction(-1)))
+
+
+@pytest.fixture(scope="module")
+def everything():
+    """A program whose Casimirs are all the cases."""
+    base = compile_text(
+        "coordinates: [x, y, z]\npoisson: {matrix: [[0, 1, 0], [-1, 0, 0], [0, 0, 0]]}\nhamiltonian: x\n"
+    )
+    named = list(cases())
+    kernel = replace(base.program.kernels["casimirs"], outputs=(Output("out", tuple(e for _, e in named)),))
+    program = replace(
+        base.program,
+        casimirs=tuple(f"C{k}" for k in range(len(named))),
+        kernels={**base.program.kernels, "casimirs": kernel},
+    )
+    return replace(base, program=program), named
+
+
+def size_of_operands(e, at):
+    """The magnitude that rounding is relative to: the value, or the operands of its outermost sum."""
+    found, *operands = values([e, *e.args], at)
+    return max([abs(found), *(abs(v) for v in operands)]) if e.op in ("add", "sub") else abs(found)
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_everything_that_can_be_written_is_computed_right(everything, target):
+    compilation, named = everything
+    assert {e.op for _, e in named} >= {*FUNCTIONS, "number", "pi", "E", "add", "sub", "neg", "mul", "pow"}
+    found = solver(compilation, target).casimirs(POINTS)
+    wrong = []
+    with mpmath.workdps(40):
+        for i, point in enumerate(POINTS):
+            at = dict(zip("xyz", map(mpmath.mpf, point), strict=True))
+            for k, (name, e) in enumerate(named):
+                (exact,) = values([e], at)
+                error = abs(mpmath.mpf(float(found[f"C{k}"][i])) - exact)
+                if not error <= BOUNDS.get(e.op, 1e-15) * size_of_operands(e, at):
+                    wrong.append(f"{name} at {dict(at)}: {found[f'C{k}'][i]!r} instead of {exact}")
+    assert not wrong, "\n".join(wrong)
+
+
+def test_kernels_of_that_program_are_not_constant(everything):
+    compilation, _ = everything
+    kernel = compilation.program.kernels["casimirs"]
+    assert isinstance(kernel, Kernel)
+    assert len(set(kernel.roots)) > 150

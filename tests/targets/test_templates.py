@@ -1,0 +1,38 @@
+"""Templates are loops over printed strings: what is decided, is decided in Python."""
+
+import re
+
+import pytest
+
+from phigen import resources
+from phigen.targets.rendering import _environment
+
+TEMPLATES = sorted(resources.templates().rglob("*.jinja"))
+IDS = [f"{path.parent.name}/{path.name}" for path in TEMPLATES]
+
+
+def test_every_target_has_templates():
+    assert {path.parent.name for path in TEMPLATES} == {"c", "numpy"}
+
+
+@pytest.mark.parametrize("path", TEMPLATES, ids=IDS)
+def test_template_is_short(path):
+    text = path.read_text(encoding="utf-8")
+    assert len(text.splitlines()) <= 60
+
+
+@pytest.mark.parametrize("path", TEMPLATES, ids=IDS)
+def test_template_contains_loops_only(path):
+    text = path.read_text(encoding="utf-8")
+    for statement in re.findall(r"{%-?\s*(.*?)\s*-?%}", text):
+        assert re.fullmatch(r"endfor|for \w+(, \w+)* in \w+", statement), statement
+    for value in re.findall(r"{{-?\s*(.*?)\s*-?}}", text):
+        assert re.fullmatch(r"\w+", value), f"{value}: neither filters nor calls nor attributes"
+    assert "{#" not in text
+
+
+@pytest.mark.parametrize("path", TEMPLATES, ids=IDS)
+def test_template_parses(path):
+    environment = _environment(path.parent.name)
+    assert environment.parse(path.read_text(encoding="utf-8"))
+    assert environment.undefined.__name__ == "StrictUndefined"
