@@ -1,0 +1,110 @@
+"""Forms on T*U with expressions as coefficients: an independent check of `phigen.realisations.cotangent`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from fractions import Fraction
+
+from phigen.geometry.shapes import coordinate_terms
+from phigen.symbolic.expression import ZERO, Expression, derivatives, number, substitute, symbol, total
+from phigen.symbolic.verdict import PROVED, decide_zero
+
+#: (a, b) with a < b → the coefficient of dz_a ∧ dz_b.
+Form = dict[tuple[int, int], Expression]
+TIME = "s:"
+
+
+def canonical(n: int) -> Form:
+    """ω = Σ dx_i ∧ dp_i in the variables x, then p."""
+    return {(i, n + i): number(1) for i in range(n)}
+
+
+def wedge(left: Sequence[Expression], right: Sequence[Expression]) -> Form:
+    """λ ∧ μ of 1-forms given by components."""
+    n = range(len(left))
+    return {(a, b): left[a] * right[b] - left[b] * right[a] for a in n for b in n if a < b}
+
+
+def combine(*parts: tuple[Fraction | int, Form]) -> Form:
+    """A linear combination."""
+    keys = sorted({key for _, form in parts for key in form})
+    return {key: total(number(Fraction(c)) * form[key] for c, form in parts if key in form) for key in keys}
+
+
+def pull_back(form: Form, images: Sequence[Expression], names: Sequence[str]) -> Form:
+    """φ*(Σ w_ab dz_a ∧ dz_b) for z∘φ = images."""
+    columns = [derivatives(images, name) for name in names]
+    d = [[column[a] for column in columns] for a in range(len(images))]
+    moved = substitute(list(form.values()), dict(zip(names, images, strict=True)))
+    parts: list[tuple[int, Form]] = []
+    for (a, b), w in zip(form, moved, strict=True):
+        parts.append((1, {key: w * c for key, c in wedge(d[a], d[b]).items()}))
+    return combine(*parts)
+
+
+def differential(f: Expression, names: Sequence[str]) -> list[Expression]:
+    """df."""
+    return [derivatives([f], name)[0] for name in names]
+
+
+def integrated(e: Expression, start: Fraction | int, end: Fraction | int) -> Expression:
+    """∫ e ds over [start, end] of a polynomial in `TIME`."""
+    terms = coordinate_terms([TIME], [e])
+    assert terms is not None
+    limits = [Fraction(start), Fraction(end)]
+    return total(
+        c * number((limits[1] ** (k + 1) - limits[0] ** (k + 1)) / Fraction(k + 1)) for (k,), c in terms[0].items()
+    )
+
+
+def equal(left: Form, right: Form) -> bool:
+    """Whether two forms are proved to agree."""
+    return decide_zero("", [("", left.get(k, ZERO) - right.get(k, ZERO)) for k in {**left, **right}]).verdict == PROVED
+
+
+def same(left: Sequence[Expression], right: Sequence[Expression]) -> bool:
+    """Whether two lists of expressions are proved to agree."""
+    return decide_zero("", [("", a - b) for a, b in zip(left, right, strict=True)]).verdict == PROVED
+
+
+def is_flow(images: Sequence[Expression], field: Sequence[Expression], names: Sequence[str]) -> bool:
+    """Whether images (in z and `TIME`) start at z and obey dΦ/ds = X∘Φ."""
+    start = substitute(images, {TIME: ZERO})
+    along = substitute(field, dict(zip(names, images, strict=True)))
+    return same(start, [symbol(name) for name in names]) and same(derivatives(images, TIME), along)
+
+
+def at_time(images: Sequence[Expression], time: Fraction | int) -> list[Expression]:
+    """The flow for a fixed time."""
+    return substitute(images, {TIME: number(Fraction(time))})
+
+
+def after(outer: Sequence[Expression], inner: Sequence[Expression], names: Sequence[str]) -> list[Expression]:
+    """outer ∘ inner."""
+    return substitute(outer, dict(zip(names, inner, strict=True)))
+
+
+def parts_in_p(e: Expression, covector: Sequence[str]) -> Mapping[int, Expression]:
+    """The homogeneous parts in p of a polynomial in p."""
+    return dict(_by_degree(e, covector))
+
+
+def _by_degree(e: Expression, covector: Sequence[str]) -> Iterator[tuple[int, Expression]]:
+    terms = coordinate_terms(covector, [e])
+    assert terms is not None
+    for degree in sorted({sum(m) for m in terms[0]}):
+        yield (
+            degree,
+            total(
+                c * total([number(1)] if not any(m) else [_monomial(m, covector)])
+                for m, c in terms[0].items()
+                if sum(m) == degree
+            ),
+        )
+
+
+def _monomial(exponents: Sequence[int], names: Sequence[str]) -> Expression:
+    result = number(1)
+    for name, k in zip(names, exponents, strict=True):
+        result = result * symbol(name) ** k if k else result
+    return result
