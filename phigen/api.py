@@ -8,16 +8,18 @@ trajectory = solver.integrate([1, 1, 1], h=0.05, steps=20_000, stride=10, I2=2.5
 
 from __future__ import annotations
 
+import re
 from os import PathLike
 from typing import TYPE_CHECKING
 
 from phigen import spec as specs
 from phigen.analysis.proof import compile_proved, located
 from phigen.compiler import Compilation, emit
-from phigen.errors import SpecError, ToolchainError
+from phigen.errors import Diagnostic, SpecError, ToolchainError
 from phigen.geometry.system import System, system_from_spec
 from phigen.spec import limits
 from phigen.spec.model import Spec
+from phigen.spec.names import IDENTIFIER, KEYWORDS, SPEC_NAME
 
 if TYPE_CHECKING:
     from phigen.runtime.solver import Solver
@@ -110,6 +112,9 @@ def chosen_target(target: str) -> str:
 
 def _spec_of(system: System) -> Spec:
     """The spec of a system built in Python; the defaults of a spec file hold for the rest."""
+    _expect_name(system.name, SPEC_NAME, "lower-case letters, digits and _, starting with a letter, at most 31")
+    for name in (*system.coordinates, *system.parameter_names):
+        _expect_name(name, IDENTIFIER, "letters, digits and _, not starting with a digit")
     return Spec(
         name=system.name,
         coordinates=system.coordinates,
@@ -120,3 +125,9 @@ def _spec_of(system: System) -> Spec:
         invariants=system.invariants,
         locations=system.locations,
     )
+
+
+def _expect_name(name: str, pattern: str, hint: str) -> None:
+    """sympy accepts any text as a name; the generated code does not."""
+    if not re.fullmatch(pattern, name) or (pattern == SPEC_NAME and name in KEYWORDS):
+        raise SpecError([Diagnostic(f"the name {name!r} cannot stand in generated code", hint=hint)])

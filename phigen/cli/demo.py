@@ -61,9 +61,8 @@ def _print(
     out(heading(compilation.spec.title) + f", compiled to {'C' if target == 'c' else 'NumPy'}")
     out("  x1' = x1 (x2 + x3),  x2' = x2 (x3 - x1),  x3' = -x3 (x1 + x2);  Casimir C = x1 x3/x2")
     start = ", ".join(f"{v:g}" for v in experiment.initial)
-    out(
-        f"  from ({start}) in {run.steps} steps of {float(run.step):g}; infinite at t* = {singularity(experiment):.7f}\n"
-    )
+    end = singularity(experiment)
+    out(f"  from ({start}) in {run.steps} steps of {float(run.step):g}; infinite at t* = {end:.7f}\n")
     errors = {name: _errors(system, experiment, t, x) for name, x in solutions.items()}
     exact = next(iter(errors.values()))[2]
     head = ["", "", *(["error of x"] + [""] * (len(errors) - 1)), *(["error of C"] + [""] * (len(errors) - 1))]
@@ -73,9 +72,7 @@ def _print(
         rows.append([f"{t[row]:.3f}", f"{exact[row, 0]:.4f}", *cells])
     for line in table(rows, right=range(len(head))):
         out(f"  {line}")
-    out(
-        f"\n  phigen K: the Poisson Hamiltonian integrator of order K ({ORDERS[0]} is the paper's). Errors are relative."
-    )
+    out(f"\n  phigen K: Poisson Hamiltonian integrator of order K, {ORDERS[0]} being the paper's. Errors: relative.")
     out("  The Casimir stays at round-off to the end; RK2 leaves its level set, and loses the solution.")
 
 

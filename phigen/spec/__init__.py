@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 __all__ = ["load", "loads", "schema", "starter"]
 
 # The work is imported inside the functions: other modules import phigen.spec.model, and that shall be cheap.
+# No module here is named as a function of this one: importing it would replace the function.
 
 
 def load(path: str | PathLike[str]) -> Spec:
@@ -46,13 +47,13 @@ def loads(text: str, file: str = "<string>") -> Spec:
 
 def schema() -> dict[str, Any]:
     """JSON Schema (draft 2020-12) of spec files, for editors."""
-    from phigen.spec.schema import schema as build
+    from phigen.spec.json_schema import schema as build
 
     return build()
 
 
 def starter(name: str) -> str:
     """A commented spec to start from. Raises `SpecError` if the name is not one for a spec."""
-    from phigen.spec.starter import starter as build
+    from phigen.spec.first_spec import starter as build
 
     return build(name)

@@ -1,0 +1,224 @@
+"""The commands that show, prove and run."""
+
+import csv
+import json
+from pathlib import Path
+
+import jsonschema
+import numpy as np
+import pytest
+from cli_specs import NOT_POISSON
+
+from phigen import resources, spec
+
+SPECS = resources.bundled_specs()
+
+
+# -- check
+
+
+def test_check_groups_statements_and_never_says_just_ok(phigen):
+    done = phigen("check", SPECS / "rigid_body.yaml")
+    assert done.exit_code == 0
+    for group in ("Poisson tensor", "Casimirs", "Bi-realisation (cayley)", "Hamilton–Jacobi series"):
+        assert group in done.stdout
+    assert "proved               {α_i, α_j} = π_ij∘α" in done.stdout
+    assert "S_2, S_4, S_6 = 0" in done.stdout
+    assert "3 generic points" in done.stdout
+
+
+def test_check_refutes_with_residual_and_goes_on(phigen, write):
+    write("good.yaml")
+    done = phigen("check", write("bad.yaml", NOT_POISSON), "good.yaml")
+    assert done.exit_code == 5
+    assert "refuted              Jacobi identity" in done.stdout
+    assert "residual: -x*y" in done.stdout
+    assert "S_2 = 0" in done.stdout  # of the good one
+
+
+def test_check_shows_the_geometry_where_no_birealisation_applies(phigen, write):
+    path = write("a.yaml")
+    poisson = "poisson: {matrix: [[0, 1 + x**2], [-1 - x**2, 0]]}"
+    head = f"phigen: 1\nname: a\ncoordinates: [x, y]\n{poisson}\nhamiltonian: x*y\n"
+    path.write_text(head + "birealisation: log-canonical\n")
+    done = phigen("check", path)
+    assert done.exit_code == 1
+    assert "proved               Jacobi identity" in done.stdout
+    assert "a.yaml:6:" in done.stderr
+
+
+def test_check_json_holds_every_statement(phigen, write):
+    (found,) = json.loads(phigen("check", "--json", write("bad.yaml", NOT_POISSON)).stdout)
+    verdicts = {s["name"]: s["verdict"] for s in found["statements"]}
+    assert verdicts["π is skew"] == "proved"
+    assert verdicts["Jacobi identity"] == "refuted"
+    assert found["refuted"] == 1
+
+
+def test_check_refutes_the_wrong_sign_of_the_paper(phigen, in_tmp):
+    Path("lv.yaml").write_text(
+        "phigen: 1\nname: lv\ncoordinates: [x, y]\npoisson: {log_canonical: [[0, 1], [-1, 0]]}\nhamiltonian: x + y\n"
+        "birealisation:\n  kind: custom\n"
+        "  alpha: [x*exp(y*p_y/2), y*exp(-x*p_x/2)]\n  beta: [x*exp(-y*p_y/2), y*exp(x*p_x/2)]\n"
+    )
+    done = phigen("check", "lv.yaml")
+    assert done.exit_code == 5
+    assert "refuted              {α_i, α_j} = π_ij∘α" in done.stdout
+
+
+# -- show
+
+
+def test_show_prints_the_series_of_mathematics(phigen, in_tmp):
+    done = phigen("show", SPECS / "harmonic_oscillator.yaml", "--json")
+    series = json.loads(done.stdout)["series"]
+    assert list(series) == ["S_1", "S_3"]
+
+
+def test_show_log_canonical_s3_and_modified_hamiltonian(phigen):
+    shown = json.loads(phigen("show", SPECS / "lotka_volterra.yaml", "--order", "4", "--json").stdout)
+    x1, x2, x3 = 2.0, 3.0, 5.0
+    value = eval(shown["series"]["S_3"]["formula"], {"x1": x1, "x2": x2, "x3": x3})
+    assert value == pytest.approx((x1 + x2) * (x1 + x3) * (x2 + x3) / 24)
+    second = json.loads(phigen("show", SPECS / "lotka_volterra.yaml", "--order", "2", "--json").stdout)
+    correction = eval(second["modified_hamiltonian"]["coefficient"], {"x1": x1, "x2": x2, "x3": x3})
+    assert correction == pytest.approx(-value)
+    assert second["modified_hamiltonian"]["power"] == 2
+
+
+def test_show_abbreviates_unless_full(phigen):
+    path = SPECS / "rigid_body.yaml"
+    assert "(81 terms)" in phigen("show", path).stdout
+    full = phigen("show", path, "--full").stdout
+    assert "…" not in "".join(line for line in full.splitlines() if line.strip().startswith("S_5"))
+
+
+def test_show_says_what_auto_picked_and_why(phigen):
+    assert "auto picked cayley, since π is linear" in phigen("show", SPECS / "rigid_body.yaml").stdout
+
+
+@pytest.mark.parametrize("name", ["rigid_body", "kepler", "poisson_not_hamiltonian", "pendulum_euler"])
+def test_latex_is_balanced_and_complete(phigen, name):
+    latex = phigen("show", SPECS / f"{name}.yaml", "--latex").stdout
+    assert latex.count("{") == latex.count("}")
+    assert latex.count("\\begin") == latex.count("\\end") > 4
+    assert "\\alpha" in latex
+    assert "S_{1}" in latex
+    assert ":" not in latex
+
+
+# -- run
+
+
+def summary(phigen, *args):
+    done = phigen("run", *args, "--json")
+    assert done.exit_code == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+@pytest.mark.parametrize("target", ["c", "numpy"])
+def test_run_stores_what_it_integrates(phigen, write, target):
+    path = write("a.yaml")
+    told = summary(phigen, path, "-t", target, "-o", "x.csv")
+    with Path("x.csv").open() as file:
+        rows = list(csv.reader(file))
+    assert rows[0][:3] == ["t", "q", "p"]
+    assert len(rows) == 52
+    assert [float(v) for v in rows[-1][1:3]] == list(told["final"].values())
+    summary(phigen, path, "-t", target, "-o", "x.npz")
+    with np.load("x.npz") as stored:
+        assert stored["x"][-1].tolist() == list(told["final"].values())
+
+
+def test_run_summary_compares_with_closed_form_and_classical_methods(phigen, write):
+    told = summary(phigen, write("a.yaml"))
+    own, rk4 = told["methods"]
+    assert own["method"] == "phigen, order 2"
+    assert 1e-4 < own["exact"]["error"] < 1e-2
+    assert 1e-7 < rk4["exact"]["error"] < 1e-5
+    assert own["energy"]["error"] < 1e-14  # the midpoint rule conserves quadratic invariants
+    assert rk4["energy"]["error"] > 1e-7
+    shown = phigen("run", "a.yaml").stdout
+    assert "against closed form" in shown
+    assert "rk4" in shown
+
+
+def test_run_overrides(phigen):
+    path = SPECS / "rigid_body.yaml"
+    options = ["--step", "0.01", "--steps", "7", "--set", "I1=3/2", "--set", "x2=0.25", "--order", "4"]
+    told = summary(phigen, path, *options)
+    assert (told["step"], told["steps"], told["order"]) == (0.01, 7, 4)
+    assert told["parameters"]["I1"] == 1.5
+    assert told["initial"]["x2"] == 0.25
+    assert summary(phigen, path, "--run", "tumbling", "--steps", "5")["parameters"]["I1"] == 1.0
+
+
+@pytest.mark.parametrize("wrong", ["I1", "I1=", "I1=a", "J=1", "I1=-1", "I1=nan", "I1=1/0"])
+def test_wrong_setting_is_a_usage_error(phigen, wrong):
+    assert phigen("run", SPECS / "rigid_body.yaml", "--set", wrong).exit_code == 2
+
+
+def test_run_falls_back_to_numpy_and_says_so(phigen, write, monkeypatch):
+    monkeypatch.setenv("CC", "/there/is/none")
+    done = phigen("run", write("a.yaml"))
+    assert done.exit_code == 0
+    assert "no C compiler" in done.stderr
+    assert "target numpy" in done.stdout
+
+
+def test_run_without_runs_explains(phigen, write):
+    path = write("a.yaml")
+    path.write_text(path.read_text().split("runs:")[0])
+    done = phigen("run", path)
+    assert done.exit_code == 1
+    assert "no runs" in done.stderr
+
+
+def test_output_of_unknown_kind_is_refused_before_the_work(phigen, write):
+    assert phigen("run", write("a.yaml"), "-o", "x.xls").exit_code == 2
+
+
+# -- new, schema, list, demo
+
+
+def test_new_writes_a_spec_that_checks_builds_and_runs(phigen, in_tmp):
+    assert phigen("new", "mysystem").exit_code == 0
+    assert spec.load("mysystem.yaml").name == "mysystem"
+    for command in ("check", "build", "run", "show"):
+        assert phigen(command, "mysystem.yaml").exit_code == 0
+    assert phigen("new", "mysystem").exit_code == 2
+    assert phigen("new", "other", "-o", "-").stdout.startswith("#")
+    assert not Path("other.yaml").exists()
+
+
+@pytest.mark.parametrize("name", ["Bad", "../up", "int", "", "x" * 99])
+def test_new_refuses_names_that_cannot_be(phigen, in_tmp, name):
+    assert phigen("new", name).exit_code == 2
+    assert not list(Path().iterdir())
+
+
+def test_schema_accepts_the_starter(phigen):
+    from ruamel.yaml import YAML
+
+    schema = json.loads(phigen("schema").stdout)
+    jsonschema.validate(YAML(typ="safe").load(spec.starter("a")), schema)
+
+
+def test_list_shows_every_bundled_spec(phigen):
+    listed = json.loads(phigen("list", "--json").stdout)
+    assert {s["name"] for s in listed} == {p.stem for p in SPECS.glob("*.yaml")}
+    table = phigen("list").stdout
+    assert all(s["title"] in table for s in listed)
+    assert phigen("list", "--path", "kepler").stdout.strip() == str(SPECS / "kepler.yaml")
+    assert "did you mean 'kepler'" in phigen("list", "--path", "keplr").stderr
+
+
+@pytest.mark.parametrize("target", ["c", "numpy"])
+def test_demo_keeps_the_casimir_at_roundoff_up_to_the_singularity(phigen, target):
+    done = phigen("demo", "-t", target)
+    assert done.exit_code == 0
+    assert "0.2553851" in done.stdout
+    cells = next(line for line in done.stdout.splitlines() if line.strip().startswith("0.255 ")).split()
+    x2, x8, x_rk, c2, c8, c_rk = map(float, cells[2:])
+    assert max(c2, c8) < 1e-13 < 1e-6 < c_rk
+    assert x8 < 1e-8 < x2 < x_rk

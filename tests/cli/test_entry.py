@@ -1,0 +1,181 @@
+"""What holds for every command: imports, exit codes, streams, colours, interrupts."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from phigen.cli import COMMANDS, group
+from phigen.errors import LimitError
+
+HEAVY = ("sympy", "numpy", "flint", "ruamel", "jinja2", "mpmath")
+PHIGEN = [sys.executable, "-c", "from phigen.cli import main; main()"]
+
+
+@pytest.mark.parametrize("args", [["--help"], ["--version"], ["build", "--help"], ["demo", "--help"], ["lst"]])
+def test_help_imports_nothing_heavy(args):
+    code = f"""
+import atexit, sys
+from phigen.cli import main
+sys.argv = ["phigen", *{args!r}]
+try:
+    main()
+finally:
+    print("heavy:", [m for m in {HEAVY!r} if m in sys.modules], file=sys.stderr)
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert "heavy: []" in done.stderr
+
+
+def test_every_command_has_help_quiet_and_verbose(phigen):
+    listing = phigen("--help").output
+    for name, (_, line) in COMMANDS.items():
+        assert line in listing
+        shown = phigen(name, "--help")
+        assert shown.exit_code == 0
+        assert "--quiet" in shown.output
+        assert "--verbose" in shown.output
+
+
+def test_wrong_spec_is_1_with_all_errors_on_stderr(phigen, write):
+    write(
+        "a.yaml",
+        "phigen: 1\nname: a\ncoordinates: [x, y]\npoisson: {matrix: [[0, 1], [-1, 0]]}\nhamiltonian: z\nordr: 2\n",
+    )
+    write("b.yaml", "phigen: 1\nname: b\n")
+    done = phigen("build", "a.yaml", "b.yaml")
+    assert done.exit_code == 1
+    assert done.stdout == ""
+    assert "a.yaml:5:14: error" in done.stderr
+    assert "a.yaml:6:1: error" in done.stderr
+    assert "b.yaml" in done.stderr
+
+
+@pytest.mark.parametrize(
+    "args", [[], ["nonsense"], ["build"], ["build", "--order", "0", "a"], ["run", "a.yaml", "--run", "nobody"]]
+)
+def test_wrong_usage_is_2(phigen, write, args):
+    write("a.yaml")
+    assert phigen(*args).exit_code == 2
+
+
+def test_exceeded_limit_is_3(phigen, write):
+    path = write("a.yaml")
+    path.write_text(path.read_text().replace("(q**2 + p**2)/2", "(" * 99 + "q" + ")" * 99))
+    assert phigen("check", path).exit_code == 3
+
+
+def test_internal_error_is_4_and_asks_for_a_report(phigen, write, monkeypatch):
+    def broken(*args, **kwargs):
+        raise IndexError("nobody expected this")
+
+    monkeypatch.setattr("phigen.analysis.proof.examine", broken)
+    done = phigen("check", write("a.yaml"))
+    assert done.exit_code == 4
+    assert "nobody expected this" in done.stderr
+    assert "report" in done.stderr
+    assert "Traceback" not in done.stderr
+    assert "Traceback" in phigen("check", "a.yaml", "-v").stderr
+
+
+def test_missing_compiler_is_6(phigen, write, monkeypatch):
+    monkeypatch.setenv("CC", "/there/is/none")
+    done = phigen("run", write("a.yaml"), "-t", "c")
+    assert done.exit_code == 6
+    assert "/there/is/none" in done.stderr
+
+
+def test_failing_integration_is_7_and_keeps_what_was_computed(phigen, write):
+    path = write("a.yaml")
+    path.write_text(path.read_text().replace("(q**2 + p**2)/2", "p**2/2 - q**6"))
+    done = phigen("run", path, "--steps", "100", "-t", "numpy", "-o", "out.csv")
+    assert done.exit_code == 7
+    assert "smaller step" in done.stderr
+    assert "energy" in done.stdout
+    assert len(path.with_name("out.csv").read_text().splitlines()) > 2
+
+
+def test_errors_of_several_specs_give_the_smallest_code(phigen, write):
+    write("a.yaml", "phigen: 1\n")
+    path = write("b.yaml")
+    path.write_text(path.read_text().replace("(q**2", "(" * 99 + "q" + ")" * 99 + " + (q**2"))
+    done = phigen("check", "b.yaml", "a.yaml")
+    assert done.exit_code == 1
+    assert "a.yaml" in done.stderr
+    assert "b.yaml" in done.stderr
+
+
+def test_unwritable_output_is_no_bug_of_phigen(phigen, write):
+    write("a.yaml")
+    write("generated", "a file, no folder")
+    done = phigen("build", "a.yaml")
+    assert done.exit_code in (2, 5)
+    assert "internal" not in done.stderr
+
+
+def test_command_with_typing_error_gets_a_suggestion(phigen):
+    assert "Did you mean 'build'?" in phigen("biuld").stderr
+
+
+def test_missing_spec_of_a_bundled_name_says_where_it_is(phigen, in_tmp):
+    assert "phigen list --path rigid_body" in phigen("run", "rigid_body.yaml").stderr
+
+
+def test_no_colour_in_pipes_and_under_no_color(phigen, write):
+    write("a.yaml", "phigen: 1\n")
+    for environment in ({}, {"NO_COLOR": "1"}):
+        done = subprocess.run(
+            [*PHIGEN, "check", "a.yaml"], capture_output=True, text=True, check=False, env={**os.environ, **environment}
+        )
+        assert "\x1b" not in done.stdout + done.stderr
+
+
+def test_colour_on_a_terminal_unless_no_color(write):
+    pty = pytest.importorskip("pty")
+    write("a.yaml", "phigen: 1\n")
+
+    def on_terminal(environment):
+        master, slave = pty.openpty()
+        clean = {k: v for k, v in os.environ.items() if k != "NO_COLOR"}
+        subprocess.run([*PHIGEN, "check", "a.yaml"], stderr=slave, check=False, env={**clean, **environment})
+        os.close(slave)
+        return os.read(master, 10000)
+
+    assert b"\x1b" in on_terminal({})
+    assert b"\x1b" not in on_terminal({"NO_COLOR": "1"})
+
+
+def test_closed_pipe_ends_quietly():
+    process = subprocess.Popen([*PHIGEN, "schema"], stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    process.stdout.close()
+    message = process.stderr.read()
+    process.stderr.close()
+    assert process.wait() == 141
+    assert message == b""
+
+
+def test_interrupt_is_130(write):
+    write("a.yaml")
+    command = [*PHIGEN, "run", "a.yaml", "-t", "numpy", "--steps", "100000000"]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    time.sleep(2)
+    process.send_signal(signal.SIGINT)
+    _, message = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert "interrupted" in message
+    assert "Traceback" not in message
+
+
+def test_completion_script_is_offered():
+    env = {**os.environ, "_PHIGEN_COMPLETE": "bash_source"}
+    code = "from phigen.cli import group; group.main(prog_name='phigen', args=[])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, env=env)
+    assert "_PHIGEN_COMPLETE=bash_complete" in done.stdout
+
+
+def test_error_classes_keep_their_codes():
+    assert LimitError.exit_code == 3
+    assert group.name

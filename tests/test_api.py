@@ -1,0 +1,98 @@
+"""The Python API, as the contract has it."""
+
+import numpy as np
+import pytest
+import sympy
+
+import phigen
+from phigen import resources, spec
+
+RIGID_BODY = resources.bundled_specs() / "rigid_body.yaml"
+
+
+@pytest.mark.parametrize("target", ["c", "numpy"])
+def test_example_of_the_documentation(target):
+    system = phigen.load(RIGID_BODY)
+    solver = phigen.compile(system, target=target, order=4)
+    trajectory = solver.integrate([1, 1, 1], h=0.05, steps=2_000, stride=10, I2=2.5)
+    assert trajectory.t.shape == (201,)
+    assert trajectory.x.shape == (201, 3)
+    assert trajectory.x[0].tolist() == [1, 1, 1]
+    assert trajectory.t[-1] == pytest.approx(100)
+    assert np.ptp(trajectory.energy) < 1e-5 * trajectory.energy[0]
+    assert np.ptp(trajectory.casimirs["C"]) < 1e-13 * 3
+    one = solver.step([1, 1, 1], h=0.05, I2=2.5)
+    assert one.shape == (3,)
+    members = solver.ensemble(np.array([[1, 1, 1], [1, 0, 0.5]]), h=0.05, steps=2_000, I2=2.5)
+    assert members.shape == (2, 3)
+    assert members[0] == pytest.approx(trajectory.x[-1], rel=1e-12)
+
+
+def test_load_gives_a_system_that_knows_its_spec():
+    system = phigen.load(RIGID_BODY)
+    assert isinstance(system, phigen.System)
+    assert system.spec is not None
+    assert system.spec.runs["reference"].steps == 200
+    assert phigen.compile(system).order == system.spec.order
+
+
+@pytest.mark.parametrize("source", [str(RIGID_BODY), RIGID_BODY, spec.load(RIGID_BODY)], ids=["text", "path", "spec"])
+def test_compile_takes_what_one_has(source):
+    assert phigen.compile(source, target="numpy", order=2).order == 2
+
+
+def from_sympy(**more):
+    (x, y), k = sympy.symbols("x y"), sympy.Symbol("k", positive=True)
+    return phigen.System.from_sympy(
+        [x, y], [[0, x * y], [-x * y, 0]], x + k * y - sympy.log(x * y), {k: 2}, name="lv", **more
+    )
+
+
+def test_system_from_sympy_compiles_and_takes_parameters():
+    solver = phigen.compile(from_sympy(), target="numpy", order=4)
+    trajectory = solver.integrate([1, 1.5], h=0.01, steps=500, k=1)
+    assert np.ptp(trajectory.energy) < 1e-7
+    with pytest.raises(ValueError, match="positive"):
+        solver.step([1, 1], h=0.1, k=-1)
+
+
+def test_refuted_mathematics_is_not_compiled():
+    x, y, z = sympy.symbols("x y z")
+    system = phigen.System.from_sympy([x, y, z], [[0, z, -y * z], [-z, 0, x], [y * z, -x, 0]], x)
+    with pytest.raises(phigen.CheckError, match="Jacobi identity"):
+        phigen.compile(system)
+    with pytest.raises(phigen.CheckError, match="F is invariant"):
+        phigen.compile(from_sympy(invariants={"F": x}))
+
+
+def test_name_that_is_no_c_prefix_is_refused():
+    x, y = sympy.symbols("x y")
+    system = phigen.System.from_sympy([x, y], [[0, 1], [-1, 0]], x * y, name="My System")
+    with pytest.raises(phigen.SpecError, match="My System"):
+        phigen.compile(system)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error"),
+    [({"target": "fortran"}, ValueError), ({"order": 0}, ValueError), ({"order": 2.5}, ValueError)],
+)
+def test_wrong_arguments_are_refused(arguments, error):
+    with pytest.raises(error):
+        phigen.compile(RIGID_BODY, **arguments)
+    with pytest.raises(TypeError):
+        phigen.compile(3.0)
+
+
+def test_auto_is_numpy_without_compiler_and_c_with_one(monkeypatch):
+    assert phigen.compile(RIGID_BODY, order=2).target == "c"
+    monkeypatch.setenv("CC", "/there/is/none")
+    assert phigen.compile(RIGID_BODY, order=2).target == "numpy"
+    with pytest.raises(phigen.ToolchainError):
+        phigen.compile(RIGID_BODY, target="c", order=2)
+
+
+def test_error_of_load_shows_the_line(tmp_path):
+    path = tmp_path / "a.yaml"
+    path.write_text("phigen: 1\nname: a\ncoordinates: [x, y]\npoisson: {lie_algebra: {name: so(3)}}\nhamiltonian: x\n")
+    with pytest.raises(phigen.SpecError, match=r"a\.yaml:4:"):
+        phigen.load(path)
