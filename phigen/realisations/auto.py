@@ -1,16 +1,21 @@
-"""The choice of a kind by the shape of π."""
+"""The choice of a kind by the shape of π. Exact closed forms come first; following paths, which always works, last."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
-from phigen.geometry.shapes import Canonical, Constant, LiePoisson, LogCanonical
+from phigen.errors import SpecError
+from phigen.geometry.shapes import Affine, Canonical, Constant, LiePoisson, LogCanonical
 from phigen.geometry.system import System
-from phigen.realisations import cayley, constant, karasev, log_canonical
+from phigen.realisations import cayley, constant, exponential, karasev, log_canonical
 from phigen.realisations.protocol import BiRealisation
 from phigen.spec.model import BirealisationChoice
 
 KIND = "auto"
+
+#: |π∇S_3| and |π∇S_5| with the Cayley transform over the same with the exponential, medians over random quadratic H
+#: (and tops): 26 and 710 on so(3)*, 8 and 49 on se(3)*, 15 and 330 on so(4)*; 0.9 to 2 on sl(2)* and gl(2)*.
+_BETTER = "preferred to the Cayley transform, whose error constants are 8 to 26 times larger on so(3), so(4) and se(3)"
 
 
 def build(system: System, choice: BirealisationChoice) -> BiRealisation:
@@ -20,8 +25,23 @@ def build(system: System, choice: BirealisationChoice) -> BiRealisation:
             found = constant.build(system, choice)
         case LogCanonical():
             found = log_canonical.build(system, choice)
-        case LiePoisson():
-            found = cayley.build(system, choice)
+        case LiePoisson() | Affine():
+            found = _of_algebra(system, choice)
         case _:
             found = karasev.build(system, choice)
     return replace(found, explanation=f"auto picked {found.kind}, since {found.explanation}")
+
+
+def _of_algebra(system: System, choice: BirealisationChoice) -> BiRealisation:
+    """Exponential in closed form, else Cayley, else the exponential by following paths."""
+    found = exponential.closed_form(system)
+    if found is not None:
+        return replace(found, explanation=f"{found.explanation}; {_BETTER}")
+    try:
+        found = cayley.build(system, choice)
+    except SpecError as error:
+        followed = exponential.followed(system, choice)
+        why = error.diagnostics[0].message
+        return replace(followed, explanation=f"{followed.explanation}; no Cayley transform either: {why}")
+    why = "the exponential has no closed form that phigen finds, and would have to follow paths numerically"
+    return replace(found, explanation=f"{found.explanation}; {why}")

@@ -19,8 +19,8 @@ from phigen.geometry.lie_algebra import LieAlgebra, Representation
 from phigen.geometry.linear import Span, add_multiple
 from phigen.geometry.matrix_algebras import failing_jacobi
 from phigen.geometry.representations import candidates, indecomposable_parts, restricted
-from phigen.geometry.shapes import LiePoisson
 from phigen.geometry.system import System, hamiltonian_vector_field
+from phigen.realisations.extension import dual_of
 from phigen.realisations.protocol import PAPER, BiRealisation, covector_symbols, is_symmetric, refuse, reversed_covector
 from phigen.spec.model import BirealisationChoice
 from phigen.symbolic.expression import ONE, Expression, number, symbol
@@ -44,25 +44,28 @@ class _Escape:
 
 
 def build(system: System, choice: BirealisationChoice) -> BiRealisation:
-    """The Cayley bi-realisation of a linear π; symmetric.
+    """The Cayley bi-realisation of a linear or affine π; symmetric.
 
-    Raises `SpecError` if π is not linear, or no known faithful representation is closed under P E_i P; the
+    Raises `SpecError` if π is neither, or no known faithful representation is closed under P E_i P; the
     message names, for each representation tried, the element that leaves the algebra.
     """
-    if not isinstance(system.shape, LiePoisson):
-        raise refuse(f"birealisation {KIND} needs a linear π, the dual of a Lie algebra; this π is {system.shape}")
-    terms, explanation = closed_product(system.shape.algebra)
-    n = system.dimension
-    x, p = [symbol(c) for c in system.coordinates], covector_symbols(system.coordinates)
-    increment = hamiltonian_vector_field(system.poisson, p)
+    dual = dual_of(system)
+    if dual is None:
+        raise refuse(f"birealisation {KIND} needs a linear or affine π; this π is {system.shape}")
+    terms, explanation = closed_product(dual.algebra)
+    n, size = system.dimension, dual.algebra.dimension
+    if any(i < n <= b for i, _, b, _ in terms):  # a ≤ b; α would depend on p_z
+        raise refuse(f"birealisation {KIND} does not restrict to this affine π", "try exponential")
+    x = [symbol(c) for c in system.coordinates]
+    increment = hamiltonian_vector_field(system.poisson, covector_symbols(system.coordinates))
     displacement = []
     for i in range(n):
         quadratic = {
-            tuple((m == a) + (m == b) for m in range(n)) + tuple(int(m == k) for m in range(n)): c
+            tuple((m == a) + (m == b) for m in range(size)) + tuple(int(m == k) for m in range(size)): c
             for (row, a, b, k), c in terms.items()
             if row == i
         }
-        curvature = _factored(quadratic, [*p, *x])
+        curvature = _factored(quadratic, [*dual.p, *dual.x])
         displacement.append(-(number(Fraction(1, 2)) * increment[i]) - number(Fraction(1, 4)) * curvature)
     alpha = tuple(xi + d for xi, d in zip(x, displacement, strict=True))
     beta = tuple(reversed_covector(alpha, system.coordinates))
@@ -74,7 +77,7 @@ def build(system: System, choice: BirealisationChoice) -> BiRealisation:
         tuple(displacement),
         increment,
         is_symmetric(alpha, beta, system.coordinates),
-        explanation=f"π is linear: Cayley transform, {explanation}; symmetric",
+        explanation=f"π is {'linear' if size == n else 'affine'}: Cayley transform, {explanation}; symmetric",
         reference=f"{PAPER}, the proposition on Lie–Poisson structures and its example so(n), with 2 for 4",
     )
 
@@ -117,7 +120,7 @@ def closed_product(algebra: LieAlgebra) -> tuple[Trilinear, str]:
             tried = tried or {"": f"no faithful representation of {ideal.name} was found"}
             raise refuse(
                 f"birealisation {KIND} does not apply to {algebra.name}: {'; '.join(tried.values())}",
-                "the kinds exponential and karasev, which need no representation, are planned; "
+                "the kind exponential needs no representation; "
                 "a closed faithful representation can be given as lie_algebra: {matrices: […]}",
             )
     if len(used) == 1 and max(map(len, used.values())) == 1:

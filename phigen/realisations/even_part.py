@@ -47,10 +47,8 @@ def even_part(algebra: LieAlgebra, x: Sequence[Expression], p: Sequence[Expressi
     """
     values: Vector = [ZERO] * algebra.dimension
     forms: list[str] = []
-    for part in indecomposable_parts(algebra):
+    for part in _parts(algebra):
         ideal = restricted(algebra, part)
-        if not ideal.constants:
-            continue
         found = _of_ideal(ideal, [x[i] for i in part], [p[i] for i in part])
         if found is None:
             return None
@@ -58,6 +56,18 @@ def even_part(algebra: LieAlgebra, x: Sequence[Expression], p: Sequence[Expressi
             values[i] = value
         forms += found.forms
     return EvenPart(tuple(values), tuple(forms))
+
+
+def _parts(algebra: LieAlgebra) -> list[list[int]]:
+    """Ideals spanned by basis elements whose sum is the algebra and which commute with each other.
+
+    They may share central elements (the last of a central extension), on which M_p x vanishes.
+    """
+    touching = {m for ij in algebra.constants for m in ij}
+    inner = {ij: {k: c for k, c in row.items() if k in touching} for ij, row in sorted(algebra.constants.items())}
+    parts = indecomposable_parts(LieAlgebra(algebra.name, algebra.dimension, inner))
+    outer = [{k for (i, _), row in algebra.constants.items() if i in part for k in row} for part in parts]
+    return [sorted({*part, *more}) for part, more in zip(parts, outer, strict=True) if part[0] in touching]
 
 
 def _of_ideal(ideal: LieAlgebra, x: Vector, p: Vector) -> EvenPart | None:
@@ -130,8 +140,9 @@ def _nilpotent(tower: Tower, matrix: Sequence[Vector], x: Vector) -> EvenPart | 
             terms.append([number((-1) ** (k // 2) * coefficient(0, k // 2)) * v for v in power])
     else:
         return None
+    form = f"a finite sum of {len(terms) + 1} terms" if terms else "no even part"
     values = tuple(total(column) for column in zip(*terms, strict=True)) if terms else (ZERO,) * len(x)
-    return EvenPart(values, (f"nilpotent, a finite sum of {len(terms) + 1} terms",))
+    return EvenPart(values, (f"nilpotent, {form}",))
 
 
 def _semisimple(tower: Tower, matrix: Sequence[Vector], x: Vector, root: Poly) -> EvenPart | None:

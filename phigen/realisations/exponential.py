@@ -13,41 +13,19 @@ a cocycle, is the hyperplane z = 1 in the dual of the central extension. b is wr
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from fractions import Fraction
 
-from phigen.geometry.lie_algebra import LieAlgebra
-from phigen.geometry.shapes import Affine, LiePoisson
+from phigen.geometry.shapes import LiePoisson
 from phigen.geometry.system import System, hamiltonian_vector_field
 from phigen.realisations.even_part import EvenPart, even_part
+from phigen.realisations.extension import dual_of
 from phigen.realisations.protocol import PAPER, BiRealisation, covector_symbols, is_symmetric, refuse
 from phigen.spec.model import BirealisationChoice
-from phigen.symbolic.expression import ONE, ZERO, Expression, number, symbol
+from phigen.symbolic.expression import Expression, number, symbol
 
 KIND = "exponential"
 REFERENCE = f"{PAPER}, the proposition on Lie–Poisson structures, with τ = exp; M. Karasev, Math. USSR Izv. 28 (1987)"
-
-
-@dataclass(frozen=True)
-class Extended:
-    """The algebra of a linear π, or the central extension of an affine one, at a point with z = 1 and p_z = 0."""
-
-    algebra: LieAlgebra
-    x: tuple[Expression, ...]
-    p: tuple[Expression, ...]
-
-
-def extended(system: System) -> Extended | None:
-    """What the formulas for Lie–Poisson structures take for the coordinates and covector of a system; None if π is
-    neither linear nor affine.
-    """
-    x, p = [symbol(c) for c in system.coordinates], covector_symbols(system.coordinates)
-    match system.shape:
-        case LiePoisson(algebra):
-            return Extended(algebra, tuple(x), tuple(p))
-        case Affine(algebra):
-            return Extended(algebra, (*x, ONE), (*p, ZERO))
-    return None
 
 
 def build(system: System, choice: BirealisationChoice) -> BiRealisation:
@@ -58,14 +36,14 @@ def build(system: System, choice: BirealisationChoice) -> BiRealisation:
     found = closed_form(system)
     if found is not None:
         return found
-    if extended(system) is None:
+    if dual_of(system) is None:
         raise refuse(f"birealisation {KIND} needs a linear or affine π; this π is {system.shape}", "try auto")
     return followed(system, choice)
 
 
 def closed_form(system: System) -> BiRealisation | None:
     """The exponential in closed form; None if π is neither linear nor affine, or no closed form was found."""
-    dual = extended(system)
+    dual = dual_of(system)
     even = even_part(dual.algebra, dual.x, dual.p) if dual else None
     if even is None:
         return None

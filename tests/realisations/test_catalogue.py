@@ -19,8 +19,9 @@ from phigen.symbolic.expression import ONE, symbol
         ("q p", "{canonical: {q: [q], p: [p]}}", "constant"),
         ("x y", "{brackets: {x: {y: 2}}}", "constant"),
         ("x y", "{brackets: {x: {y: 3*x*y}}}", "log-canonical"),
-        ("x y z", "{brackets: {x: {y: z}}}", "cayley"),
-        ("x y", "{lie_algebra: {name: aff(1)}}", "cayley"),
+        ("x y z", "{brackets: {x: {y: z}}}", "exponential"),
+        ("x y z", "{brackets: {x: {y: z + 1, z: y}}}", "exponential"),
+        ("x y", "{lie_algebra: {name: aff(1)}}", "exponential"),
     ],
 )
 def test_auto_picks_by_shape_and_explains(coordinates, poisson, kind):

@@ -1,0 +1,35 @@
+"""Linear and affine π as one case: the dual of a Lie algebra, or the hyperplane z = 1 of a central extension."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from phigen.geometry.lie_algebra import LieAlgebra
+from phigen.geometry.shapes import Affine, LiePoisson
+from phigen.geometry.system import System
+from phigen.realisations.protocol import covector_symbols
+from phigen.symbolic.expression import ONE, ZERO, Expression, symbol
+
+
+@dataclass(frozen=True)
+class Dual:
+    """A point x of the dual and an element p of a Lie algebra.
+
+    For an affine π the algebra is the central extension, its last components x_z = 1 and p_z = 0: x_z is a Casimir,
+    so the hyperplane is a Poisson submanifold, and as long as the maps do not depend on p_z they restrict to it.
+    """
+
+    algebra: LieAlgebra
+    x: tuple[Expression, ...]
+    p: tuple[Expression, ...]
+
+
+def dual_of(system: System) -> Dual | None:
+    """What formulas for Lie–Poisson structures take for coordinates and covector; None for other π."""
+    x, p = [symbol(c) for c in system.coordinates], covector_symbols(system.coordinates)
+    match system.shape:
+        case LiePoisson(algebra):
+            return Dual(algebra, tuple(x), tuple(p))
+        case Affine(extension):
+            return Dual(extension, (*x, ONE), (*p, ZERO))
+    return None
