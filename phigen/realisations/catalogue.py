@@ -34,7 +34,7 @@ BUILDERS: dict[str, Builder] = {
 }
 
 #: Kinds of the spec format that a later version brings.
-PLANNED = ("group-map", "karasev", "product", "pullback")
+PLANNED = ("group-map", "product", "pullback")
 
 
 def realise(system: System, choice: BirealisationChoice | None = None) -> BiRealisation:

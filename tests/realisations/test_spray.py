@@ -166,9 +166,9 @@ def test_quadratic_example_flow_form_and_psi():
     psi = exponential_map(HALF)
     assert equal(pull_back(omega, psi, NAMES), canonical(N))
     assert not equal(pull_back(omega, exponential_map(-HALF), NAMES), canonical(N))  # the sign that is printed
-    # β̅_j = x_j e^{−u_j}, and ψ keeps u_j.
+    # β̅_j = x_j e^{−u_j} = x_j (e^{−½u_j})², and ψ keeps u_j.
     assert same(after(U, psi, NAMES), U)
-    alpha, beta = psi[:N], [image * call("exp", -u) for image, u in zip(psi, U, strict=False)]
+    alpha, beta = psi[:N], [image * call("exp", -(HALF * u)) ** 2 for image, u in zip(psi, U, strict=False)]
     catalogue = realise(system("x y z", LOG3), BirealisationChoice("log-canonical"))
     assert same(alpha, catalogue.alpha)
     assert same(beta, catalogue.beta)

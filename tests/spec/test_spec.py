@@ -39,7 +39,7 @@ def form(written: str) -> PoissonForm:
 def test_defaults() -> None:
     found = spec()
     assert (found.order, found.terms, found.license, found.targets) == (4, None, "0BSD", ("c", "numpy"))
-    assert (found.composition, found.gauge, found.scheme, found.birealisation.kind) == ("none", "none", "auto", "auto")
+    assert (found.composition, found.gauge, found.scheme, found.birealisation.kind) == ("auto", "none", "auto", "auto")
     assert (found.solver.method, found.solver.tolerance, found.solver.max_iterations) == ("auto", None, 20)
     assert not found.runs
     assert found.dimension == 3
@@ -120,6 +120,13 @@ def test_momenta_of_a_custom_birealisation_are_symbols_of_their_own() -> None:
     found = spec(birealisation=f"{{kind: custom, alpha: {halves[0]}, beta: {halves[1]}}}").birealisation
     assert found.alpha == (X1 - symbol("p:x1") / 2, X2, X3)
     assert found.beta == (X1 + symbol("p:x1") / 2, X2, X3)
+
+
+def test_a_spray_is_a_name_or_quadratic_forms_in_the_momenta() -> None:
+    assert spec(birealisation="spray").birealisation.spray == "auto"
+    assert spec(birealisation="{kind: spray, spray: flat, degree: 5}").birealisation.degree == 5
+    forces = spec(birealisation="{kind: spray, spray: [p_x1*p_x2, 0, x3*p_x3**2]}").birealisation.spray
+    assert [str(f) for f in forces] == ["p:x1*p:x2", "0", "x3*p:x3**2"]
 
 
 def test_names_with_p_are_free_without_a_custom_birealisation() -> None:
