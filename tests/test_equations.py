@@ -1,0 +1,55 @@
+"""The systems of the corpus against equations of motion written by hand, and states found without phigen."""
+
+import json
+from pathlib import Path
+
+import mpmath
+import numpy as np
+import pytest
+from equations import FIELDS, extrapolated
+from support import compiled, setting, solver, values
+
+from phigen import resources
+
+REFERENCES = json.loads(Path(__file__).with_name("references.json").read_text(encoding="utf-8"))["references"]
+BUNDLED = {path.stem for path in resources.bundled_specs().glob("*.yaml")}
+
+
+@pytest.mark.parametrize("name", sorted(BUNDLED & set(FIELDS)))
+def test_vector_field_is_that_of_the_equations_of_motion(name):
+    system = compiled(name).system
+    centre = setting(compiled(name)).x
+    draw = np.random.default_rng(1)
+    with mpmath.workdps(30):
+        for _ in range(3):
+            x = [mpmath.mpf(v + w) for v, w in zip(centre, draw.uniform(0.01, 0.1, len(centre)), strict=True)]
+            at = {**dict(zip(system.coordinates, x, strict=True)), **_parameters(name)}
+            found, expected = values(system.vector_field(), at), FIELDS[name](x)
+            for a, b in zip(found, expected, strict=True):
+                assert abs(a - b) <= 1e-28 * (1 + abs(b))
+
+
+def _parameters(name):
+    """Defaults, as the decimal numbers that the specs state."""
+    return {p.name: mpmath.mpf(str(float(p.value))) for p in compiled(name).system.parameters}
+
+
+@pytest.mark.parametrize("name", sorted(set(REFERENCES) & set(FIELDS)))
+def test_reference_state_is_the_solution_in_many_digits(name):
+    expected, run = REFERENCES[name], compiled(name).spec.runs["reference"]
+    with mpmath.workdps(30):
+        start = [mpmath.mpf(v.numerator) / v.denominator for v in run.initial]
+        pieces = 10 + int(expected["time"])
+        state = extrapolated(FIELDS[name], start, expected["time"], pieces, 13)
+        for found, stated in zip(state, expected["state"], strict=True):
+            assert abs(found - mpmath.mpf(stated)) < 1e-13
+
+
+@pytest.mark.parametrize("name", sorted(set(REFERENCES) & set(FIELDS)))
+def test_run_ends_at_the_reference_state(name):
+    compilation, expected = compiled(name), REFERENCES[name]
+    run = compilation.spec.runs["reference"]
+    at = setting(compilation, run)
+    trajectory = solver(compilation, "c").integrate(at.x, h=at.h, steps=int(run.steps), stride=int(run.steps))
+    error = np.max(np.abs(trajectory.x[-1] - np.array([float(v) for v in expected["state"]])))
+    assert error <= expected["tolerance"]
