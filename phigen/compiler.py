@@ -18,7 +18,8 @@ from phigen import spec as specs
 from phigen.geometry.system import System, system_from_spec
 from phigen.realisations.catalogue import realise
 from phigen.realisations.protocol import BiRealisation
-from phigen.scheme.assemble import Order, build_program, plan_order
+from phigen.scheme.assemble import build_program
+from phigen.scheme.order import Order, plan_order
 from phigen.scheme.program import Program
 from phigen.spec.model import Spec
 

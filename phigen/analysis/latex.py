@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from phigen.analysis.formulas import SHOWN, latex, of_polynomial, readable_latex
 from phigen.compiler import Compilation
-from phigen.scheme.assemble import series_of
+from phigen.scheme.discretisation import series_of
 from phigen.symbolic.expression import symbol
 
 

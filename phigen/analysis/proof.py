@@ -12,7 +12,7 @@ from phigen.geometry import checks
 from phigen.geometry.jacobi import jacobi_identity
 from phigen.geometry.system import System, system_from_spec
 from phigen.realisations import axioms
-from phigen.scheme.assemble import series_of
+from phigen.scheme.discretisation import series_of
 from phigen.series.hamilton_jacobi import residual
 from phigen.spec.model import Spec
 from phigen.symbolic.verdict import REFUTED, Statement, decide_elements

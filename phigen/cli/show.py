@@ -120,7 +120,7 @@ def series_formulas(compilation: Compilation, most: int | None) -> tuple[list[tu
     The map of step h is the flow of H − h^p S_{p+1} + …, where p is the order and S the untruncated series.
     """
     from phigen.analysis.formulas import of_polynomial
-    from phigen.scheme.assemble import series_of
+    from phigen.scheme.discretisation import series_of
 
     plan = compilation.order
     more = plan.order <= _MODIFIED_UP_TO

@@ -19,7 +19,6 @@ from phigen.symbolic.expression import ZERO, Expression, gradient, substitute
 from phigen.symbolic.taylor import ExpressionRing, Taylor, closure
 from phigen.symbolic.tower import Poly, Tower
 
-
 #: A term S_i with more monomials than this ends the recursion: the next would take minutes.
 MOST_TERMS = 50_000
 

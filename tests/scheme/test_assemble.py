@@ -5,8 +5,9 @@ import pytest
 from support import BODY, NAMES, compile_text, compiled, values
 
 from phigen.errors import LimitError
-from phigen.scheme import assemble
-from phigen.scheme.assemble import GRAPH_TERMS, Order, generating_function, plan_order, series_of
+from phigen.scheme import discretisation
+from phigen.scheme.discretisation import GRAPH_TERMS, generating_function, series_of
+from phigen.scheme.order import Order, plan_order
 from phigen.scheme.collected import collect
 from phigen.scheme.generating import STEP, collected_form, graph_form
 from phigen.scheme.staging import Coefficients
@@ -98,7 +99,7 @@ def test_collected_polynomials_differentiate_like_the_tower():
 
 
 def test_a_program_beyond_the_budget_is_refused_with_a_hint(monkeypatch):
-    monkeypatch.setattr(assemble, "MOST_OPERATIONS", 100)
+    monkeypatch.setattr(discretisation, "MOST_OPERATIONS", 100)
     with pytest.raises(LimitError) as caught:
         compile_text(BODY + "order: 6\n")
     assert "order" in str(caught.value)

@@ -8,7 +8,7 @@ import pytest
 import sympy
 from support import BODY, NAMES, SPECIES, compile_text, compiled, symbols, values
 
-from phigen.scheme.assemble import series_of
+from phigen.scheme.discretisation import series_of
 from phigen.series.hamilton_jacobi import graph_series, polynomial_series, residual
 from phigen.symbolic.expression import ONE, PI, ZERO, Expression, call, number, power, sqrt, symbol
 from phigen.symbolic.tower import Tower

@@ -1,0 +1,114 @@
+"""How an order is reached: the generating function taken directly, or a composition of steps of order 2."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from phigen.errors import Diagnostic, LimitError, SpecError
+from phigen.geometry.system import System
+from phigen.realisations import karasev
+from phigen.realisations.protocol import BiRealisation
+from phigen.scheme.composition import find, orders
+from phigen.scheme.generating import STEP, GeneratingFunction, collected_form, graph_form
+from phigen.scheme.order import Order
+from phigen.series.hamilton_jacobi import PolynomialSeries, graph_series, polynomial_series
+from phigen.symbolic.expression import Expression
+
+#: Most operations in one kernel; about 5 MB of C and a minute of compilation.
+MOST_OPERATIONS = 100_000
+
+#: Below this cost of gradient and Hessian no composition is considered.
+COMPOSE_ABOVE = 2_000
+
+#: A direct series may cost this many times a composition: its error constant is that much better.
+DIRECT_WORTH = 4
+
+#: The graph form is tried up to this many terms, and beyond only if the collected form is too large.
+GRAPH_TERMS = 5
+
+
+def formal_alpha(system: System, realisation: BiRealisation, terms: int) -> tuple[Expression, ...]:
+    """The source map from which S_1 … S_terms are computed: for paths, its series to the degree that they need."""
+    return tuple(karasev.series(system, terms - 1)) if realisation.path and terms > 1 else realisation.alpha
+
+
+def series_of(system: System, realisation: BiRealisation, terms: int) -> PolynomialSeries:
+    """S_1 … S_terms in a tower that also contains the step size."""
+    return polynomial_series(
+        system.hamiltonian,
+        formal_alpha(system, realisation, terms),
+        system.coordinates,
+        [*system.parameter_names, STEP],
+        terms,
+        symmetric=realisation.symmetric,
+    )
+
+
+def generating_function(system: System, realisation: BiRealisation, terms: int) -> GeneratingFunction:
+    """∇S_h and Hess S_h in the cheapest form. LimitError if every form is too large."""
+    coordinates, static, symmetric = system.coordinates, system.parameter_names, realisation.symmetric
+    candidates = []
+    if terms <= GRAPH_TERMS:
+        alpha = formal_alpha(system, realisation, terms)
+        graph = graph_series(system.hamiltonian, alpha, coordinates, terms, symmetric=symmetric)
+        candidates.append(graph_form(graph, coordinates, static))
+    worth = min((c.cost() for c in candidates), default=MOST_OPERATIONS)
+    try:
+        series = series_of(system, realisation, terms)
+        candidates = [*collected_form(series, coordinates, static, worth), *candidates]
+    except OverflowError:
+        pass
+    if not candidates or min(c.cost() for c in candidates) > MOST_OPERATIONS:
+        raise too_large(system, f"S_1 … S_{terms} take more than {MOST_OPERATIONS} operations")
+    return min(candidates, key=GeneratingFunction.cost)
+
+
+@dataclass(frozen=True)
+class Discretisation:
+    """How the order is reached: the terms of one stage, and the stages of a step."""
+
+    generating: GeneratingFunction
+    terms: int
+    fractions: tuple[float, ...] = (1.0,)
+    note: str = ""
+
+
+def discretise(system: System, realisation: BiRealisation, order: Order, composition: str) -> Discretisation:
+    """The direct series, or a symmetric composition of the method of order 2 where that was asked for or is cheaper.
+
+    ``auto`` composes only if the direct series is beyond the budget or costs more than `DIRECT_WORTH` times
+    the stages of a composition, since its error constant is much smaller.
+    """
+    if composition not in ("auto", "none"):
+        return _composed(system, realisation, order, composition)
+    possible = composition == "auto" and realisation.symmetric and find("auto", order.order) is not None
+    try:
+        direct = Discretisation(generating_function(system, realisation, order.terms), order.terms)
+    except LimitError:
+        if not possible:
+            raise
+        return _composed(system, realisation, order, "auto")
+    if not possible or direct.generating.cost() < COMPOSE_ABOVE:
+        return direct
+    composed = _composed(system, realisation, order, "auto")
+    price = DIRECT_WORTH * len(composed.fractions) * (composed.generating.cost() + system.dimension**2)
+    return composed if direct.generating.cost() > price else direct
+
+
+def _composed(system: System, realisation: BiRealisation, order: Order, name: str) -> Discretisation:
+    found = find(name, order.order)
+    if found is None or not realisation.symmetric:
+        reason = (
+            f"composition {name} offers the orders {orders(name)}, not {order.order}"
+            if realisation.symmetric
+            else f"composition {name} needs a symmetric bi-realisation; {realisation.kind} is not"
+        )
+        place = system.locations.get(("composition",)) or system.locations.get(("order",))
+        raise SpecError([Diagnostic(reason, place, "composition: none takes the series directly")])
+    note = f"composition: {found.name}, {len(found.fractions)} stages of order 2"
+    return Discretisation(generating_function(system, realisation, 1), 1, found.fractions, note)
+
+
+def too_large(system: System, reason: str) -> LimitError:
+    """The error for a program beyond the budget."""
+    return LimitError([Diagnostic(reason, system.locations.get(("order",)), "ask for a lower order")])

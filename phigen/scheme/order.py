@@ -1,0 +1,34 @@
+"""The order of a method and the terms of the series that give it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Order:
+    """The order of the method and the number of terms S_1 … S_k that give it."""
+
+    order: int
+    terms: int
+    note: str = ""
+
+
+def plan_order(order: int | None, terms: int | None, *, symmetric: bool) -> Order:
+    """The terms that an order needs, or the order that terms give.
+
+    In a symmetric bi-realisation the even S_i vanish and the method is symmetric, so its order is even:
+    S_1 … S_k with k odd gives order k + 1. Otherwise S_1 … S_k gives order k.
+    """
+    if terms is not None:
+        if not symmetric:
+            return Order(terms, terms)
+        kept = terms if terms % 2 else terms - 1 or 1
+        note = "" if kept == terms else f"S_{terms} = 0 in a symmetric bi-realisation"
+        return Order(kept + 1, kept, note)
+    order = order or 2
+    if not symmetric:
+        return Order(order, order)
+    if order % 2:
+        return Order(order + 1, order, f"order {order} was asked for; a symmetric method has even order")
+    return Order(order, order - 1)
