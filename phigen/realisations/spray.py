@@ -20,53 +20,30 @@ Sprays and symplectic realisations: M. Crainic, I. Mărcuţ, J. Symplectic Geom.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from fractions import Fraction
-from math import factorial
 
-from phigen.errors import Diagnostic, LimitError
-from phigen.geometry.shapes import LogCanonical
-from phigen.geometry.system import System, hamiltonian_vector_field
+from phigen.errors import LimitError
+from phigen.geometry.system import System
 from phigen.realisations.axioms import check
-from phigen.realisations.cotangent import Components, Cotangent, GradedForm, GradedFunction
+from phigen.realisations.cotangent import Cotangent, GradedFunction
 from phigen.realisations.moser import Step, pulled_back, straighten
-from phigen.realisations.protocol import (
-    PAPER,
-    BiRealisation,
-    covector_names,
-    covector_symbols,
-    is_symmetric,
-    refuse,
-    reversed_covector,
-)
+from phigen.realisations.protocol import PAPER, BiRealisation, is_symmetric, refuse, reversed_covector
+from phigen.realisations.spray_field import Spray, centred_form, lie_series, make_spray
 from phigen.spec.model import BirealisationChoice
-from phigen.symbolic.expression import ZERO, Expression, call, number, symbol, symbols_of
+from phigen.symbolic.expression import Expression, call, number, symbol
 from phigen.symbolic.tower import Poly
-from phigen.symbolic.verdict import PROVED, shortened
+from phigen.symbolic.verdict import PROVED
 
 KIND = "spray"
 REFERENCE = f"{PAPER}, section on Poisson sprays; M. Crainic, I. Mărcuţ, J. Symplectic Geom. 9 (2011)"
 
 #: A Lie series is taken for nilpotent if it ends within so many terms.
 LONGEST = 8
-#: Most terms of one polynomial of a series.
-MOST_TERMS = 20_000
 #: A search for a closed form gives up at polynomials with more terms than this.
 SEARCHED_TERMS = 500
 DEFAULT_ORDER = 4
-
-
-@dataclass(frozen=True)
-class Spray:
-    """The field X on T*U, components for x then p, in the ring that holds it; ``name`` says which spray it is."""
-
-    space: Cotangent
-    field: Components
-    name: str
-
-    def apply(self, f: Poly) -> Poly:
-        """L_X f."""
-        return self.space.along(self.field, f)
+#: What to take for the flat spray where it has no closed form.
+KARASEV = "; the kind karasev follows the flow of the same spray to round-off"
 
 
 def build(system: System, choice: BirealisationChoice) -> BiRealisation:
@@ -83,91 +60,6 @@ def build(system: System, choice: BirealisationChoice) -> BiRealisation:
     if exact is not None:
         return exact
     return _truncation(system, spray, choice)
-
-
-# -- the spray -----------------------------------------------------------------------------------------
-
-
-def make_spray(system: System, given: str | Sequence[Expression]) -> Spray:
-    """The spray that a spec asks for, see `build`; SpecError if it is none."""
-    name, forces = _covector_part(system, given)
-    velocity = hamiltonian_vector_field(system.poisson, covector_symbols(system.coordinates))
-    space = Cotangent(system.coordinates, [*velocity, *forces])
-    spray = Spray(space, space.tower.convert_all([*velocity, *forces]), name)
-    _expect_quadratic(system, spray, forces)
-    return spray
-
-
-def _covector_part(system: System, given: str | Sequence[Expression]) -> tuple[str, Sequence[Expression]]:
-    if not isinstance(given, str):
-        return "given in the spec", _checked(system, given)
-    if given == "natural" or (given == "auto" and isinstance(system.shape, LogCanonical)):
-        return "natural", _natural(system)
-    if given in ("auto", "flat"):
-        return "flat", [ZERO] * system.dimension
-    raise refuse(f"unknown spray {given!r}", "auto, flat, natural or one expression for each coordinate")
-
-
-def _natural(system: System) -> list[Expression]:
-    if not isinstance(system.shape, LogCanonical):
-        raise refuse(
-            f"the natural spray is that of {{x_i, x_j}} = a_ij x_i x_j; this π is {system.shape}", "try spray: flat"
-        )
-    p = covector_symbols(system.coordinates)
-    products = [symbol(c) * pi for c, pi in zip(system.coordinates, p, strict=True)]
-    rates = hamiltonian_vector_field(system.shape.a, products)
-    return [-(pj * rate) for pj, rate in zip(p, rates, strict=True)]
-
-
-def _checked(system: System, forces: Sequence[Expression]) -> Sequence[Expression]:
-    if len(forces) != system.dimension:
-        raise refuse(f"spray has {len(forces)} components for {system.dimension} coordinates")
-    allowed = {*system.coordinates, *system.parameter_names, *covector_names(system.coordinates)}
-    unknown = [s for s in symbols_of(*forces) if s not in allowed]
-    if unknown:
-        raise refuse(f"spray uses {unknown[0]}, which is no coordinate, parameter or p_NAME")
-    return forces
-
-
-def _expect_quadratic(system: System, spray: Spray, forces: Sequence[Expression]) -> None:
-    """A smooth function that is homogeneous of degree 2 is a quadratic form, so the ring decides."""
-    space, n = spray.space, system.dimension
-    tower = space.tower
-    inside = [
-        k
-        for k, g in enumerate(tower.generators, len(tower.symbols))
-        if any(tower.depends_on(a, space.names[n:]) for a in g.arguments)
-    ]
-    for c, component, e in zip(system.coordinates, spray.field[n:], forces, strict=True):
-        degrees = {sum(m[n : 2 * n]) for m in component.to_dict()}
-        if degrees - {2} or any(component.degrees()[k] for k in inside):
-            raise refuse(
-                f"spray: the component of p_{c}, {shortened(e)}, is not homogeneous of degree 2 in the covector",
-                "a spray has components Σ f_kl(x) p_k p_l",
-            )
-
-
-def lie_series(spray: Spray, f: Poly, length: int, most_terms: int = MOST_TERMS) -> list[Poly]:
-    """L_Xᵏ f / k! for k = 0 … length; LimitError beyond ``most_terms`` terms."""
-    result = [f]
-    for k in range(1, length + 1):
-        result.append(spray.space.scaled(spray.apply(result[-1]), Fraction(1, k)))
-        if len(result[-1]) > most_terms:
-            raise LimitError(
-                [Diagnostic(f"the Lie series of the spray has more than {most_terms} terms", hint="lower the degree")]
-            )
-    return result
-
-
-def centred_form(spray: Spray, top: int) -> GradedForm:
-    """The parts of Ω₀ = ∫_{−½}^{½} Φˢ*ω ds up to a weight: L_Xᵏ ω / ((k+1)! 2ᵏ) at weight k + 1, k even."""
-    space, form = spray.space, spray.space.canonical()
-    result = {1: form}
-    for k in range(1, top):
-        form = space.lie(spray.field, form)
-        if k % 2 == 0:
-            result[k + 1] = space.sum([(Fraction(1, factorial(k + 1) * 2**k), form)])
-    return result
 
 
 # -- closed forms --------------------------------------------------------------------------------------
@@ -291,8 +183,9 @@ def _truncation(system: System, spray: Spray, choice: BirealisationChoice) -> Bi
         exact=False,
         degree=degree,
         explanation=f"Poisson spray ({spray.name}): no closed form was found; approximate, Poisson up to degree "
-        f"{degree} in p: α and β are formal series cut off there, so that a step h is a Poisson map, and keeps "
-        f"Casimirs, up to O(h^{degree + 1}) only; symmetric",
+        f"{degree} in p: α and β are formal series cut off there, so that a step h is guaranteed to be a Poisson "
+        f"map, and to keep Casimirs, up to O(h^{degree + 1}) only; symmetric"
+        + (KARASEV if spray.name == "flat" else ""),
         reference=REFERENCE,
     )
 

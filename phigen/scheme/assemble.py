@@ -89,8 +89,8 @@ def approximation(realisation: BiRealisation) -> list[str]:
         return []
     degree = realisation.degree
     how = "" if degree is None else f": alpha and beta are cut off at degree {degree} in p"
-    rate = "" if degree is None else f", up to O(h^{degree + 1}) a step"
-    return [f"approximate{how}; it is a Poisson map and keeps Casimirs only approximately{rate}"]
+    rate = "approximately" if degree is None else f"up to O(h^{degree + 1})"
+    return [f"approximate{how}; a step is guaranteed to be a Poisson map and to keep Casimirs {rate} only"]
 
 
 def _within_budget(kernel: Kernel, system: System) -> None:

@@ -29,7 +29,7 @@ from phigen.realisations import karasev
 from phigen.realisations.axioms import check
 from phigen.realisations.catalogue import realise
 from phigen.realisations.protocol import covector_names, covector_symbols
-from phigen.realisations.spray import centred_form, lie_series, make_spray
+from phigen.realisations.spray_field import centred_form, lie_series, make_spray
 from phigen.series.hamilton_jacobi import polynomial_series
 from phigen.spec import loads
 from phigen.spec.model import BirealisationChoice

@@ -1,0 +1,119 @@
+"""A Poisson spray as a vector field on T*U: made from what a spec says, checked, and its Lie series.
+
+X = Σ (πp)_i ∂_{x_i} + Σ f_j(x, p) ∂_{p_j} with f_j = Σ f_jkl(x) p_k p_l: it lifts πp and is homogeneous of weight 1
+(paper, section "Poisson Spray and Moser's trick"; its example sums over i < j for all i, j).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from math import factorial
+
+from phigen.errors import Diagnostic, LimitError
+from phigen.geometry.shapes import LogCanonical
+from phigen.geometry.system import System, hamiltonian_vector_field
+from phigen.realisations.cotangent import Components, Cotangent, GradedForm
+from phigen.realisations.protocol import covector_names, covector_symbols, refuse
+from phigen.symbolic.expression import ZERO, Expression, symbol, symbols_of
+from phigen.symbolic.tower import Poly
+from phigen.symbolic.verdict import shortened
+
+#: Most terms of one polynomial of a series.
+MOST_TERMS = 20_000
+
+
+@dataclass(frozen=True)
+class Spray:
+    """The field X on T*U, components for x then p, in the ring that holds it; ``name`` says which spray it is."""
+
+    space: Cotangent
+    field: Components
+    name: str
+
+    def apply(self, f: Poly) -> Poly:
+        """L_X f."""
+        return self.space.along(self.field, f)
+
+
+def make_spray(system: System, given: str | Sequence[Expression]) -> Spray:
+    """The spray that a spec asks for, see `build`; SpecError if it is none."""
+    name, forces = _covector_part(system, given)
+    velocity = hamiltonian_vector_field(system.poisson, covector_symbols(system.coordinates))
+    space = Cotangent(system.coordinates, [*velocity, *forces])
+    spray = Spray(space, space.tower.convert_all([*velocity, *forces]), name)
+    _expect_quadratic(system, spray, forces)
+    return spray
+
+
+def _covector_part(system: System, given: str | Sequence[Expression]) -> tuple[str, Sequence[Expression]]:
+    if not isinstance(given, str):
+        return "given in the spec", _checked(system, given)
+    if given == "natural" or (given == "auto" and isinstance(system.shape, LogCanonical)):
+        return "natural", _natural(system)
+    if given in ("auto", "flat"):
+        return "flat", [ZERO] * system.dimension
+    raise refuse(f"unknown spray {given!r}", "auto, flat, natural or one expression for each coordinate")
+
+
+def _natural(system: System) -> list[Expression]:
+    if not isinstance(system.shape, LogCanonical):
+        raise refuse(
+            f"the natural spray is that of {{x_i, x_j}} = a_ij x_i x_j; this π is {system.shape}", "try spray: flat"
+        )
+    p = covector_symbols(system.coordinates)
+    products = [symbol(c) * pi for c, pi in zip(system.coordinates, p, strict=True)]
+    rates = hamiltonian_vector_field(system.shape.a, products)
+    return [-(pj * rate) for pj, rate in zip(p, rates, strict=True)]
+
+
+def _checked(system: System, forces: Sequence[Expression]) -> Sequence[Expression]:
+    if len(forces) != system.dimension:
+        raise refuse(f"spray has {len(forces)} components for {system.dimension} coordinates")
+    allowed = {*system.coordinates, *system.parameter_names, *covector_names(system.coordinates)}
+    unknown = [s for s in symbols_of(*forces) if s not in allowed]
+    if unknown:
+        raise refuse(f"spray uses {unknown[0]}, which is no coordinate, parameter or p_NAME")
+    return forces
+
+
+def _expect_quadratic(system: System, spray: Spray, forces: Sequence[Expression]) -> None:
+    """A smooth function that is homogeneous of degree 2 is a quadratic form, so the ring decides."""
+    space, n = spray.space, system.dimension
+    tower = space.tower
+    inside = [
+        k
+        for k, g in enumerate(tower.generators, len(tower.symbols))
+        if any(tower.depends_on(a, space.names[n:]) for a in g.arguments)
+    ]
+    for c, component, e in zip(system.coordinates, spray.field[n:], forces, strict=True):
+        degrees = {sum(m[n : 2 * n]) for m in component.to_dict()}
+        if degrees - {2} or any(component.degrees()[k] for k in inside):
+            raise refuse(
+                f"spray: the component of p_{c}, {shortened(e)}, is not homogeneous of degree 2 in the covector",
+                "a spray has components Σ f_kl(x) p_k p_l",
+            )
+
+
+def lie_series(spray: Spray, f: Poly, length: int, most_terms: int = MOST_TERMS) -> list[Poly]:
+    """L_Xᵏ f / k! for k = 0 … length; LimitError beyond ``most_terms`` terms."""
+    result = [f]
+    for k in range(1, length + 1):
+        result.append(spray.space.scaled(spray.apply(result[-1]), Fraction(1, k)))
+        if len(result[-1]) > most_terms:
+            raise LimitError(
+                [Diagnostic(f"the Lie series of the spray has more than {most_terms} terms", hint="lower the degree")]
+            )
+    return result
+
+
+def centred_form(spray: Spray, top: int) -> GradedForm:
+    """The parts of Ω₀ = ∫_{−½}^{½} Φˢ*ω ds up to a weight: L_Xᵏ ω / ((k+1)! 2ᵏ) at weight k + 1, k even."""
+    space, form = spray.space, spray.space.canonical()
+    result = {1: form}
+    for k in range(1, top):
+        form = space.lie(spray.field, form)
+        if k % 2 == 0:
+            result[k + 1] = space.sum([(Fraction(1, factorial(k + 1) * 2**k), form)])
+    return result
