@@ -53,10 +53,10 @@ class Collector:
 
 def report(error: Exception, console: Console) -> int:
     """Say what failed, and return the exit code."""
+    if isinstance(error, click.exceptions.Abort) or _is_interrupt(error):
+        console.error("interrupted")
+        return INTERRUPTED
     match error:
-        case click.exceptions.Abort():
-            console.error("interrupted")
-            return INTERRUPTED
         case click.ClickException():
             error.show()
             return error.exit_code if isinstance(error, click.UsageError) else USAGE
@@ -77,6 +77,15 @@ def report(error: Exception, console: Console) -> int:
             console.error(f"error: {os.fspath(error.filename)}: {error.strerror or error}")
             return USAGE
     return _internal(error, console)
+
+
+def _is_interrupt(error: BaseException | None) -> bool:
+    """Whether it all began with Ctrl-C: libraries may turn that into an error of their own, in an import say."""
+    while error is not None:
+        if isinstance(error, KeyboardInterrupt):
+            return True
+        error = error.__cause__ or error.__context__
+    return False
 
 
 def _described(error: PhigenError) -> str:

@@ -208,7 +208,7 @@ def print_summary(
     run, name = experiment.run, compilation.spec.name
     end = trajectory.t[-1]
     out(heading(f"{name}, run {run.name}") + (f": {run.description}" if run.description else ""))
-    chosen = f"{compilation.realisation.kind}, order {solver.order}, target {solver.target}"
+    chosen = f"{compilation.realisation.label}, order {solver.order}, target {solver.target}"
     out(f"  {trajectory.steps} steps of {float(run.step):.9g}, t = 0 … {end:.9g}; {chosen}")
     final = ", ".join(f"{c} = {v:.9g}" for c, v in zip(solver.coordinates, trajectory.x[-1].tolist(), strict=True))
     out(f"  final state: {final}\n")
@@ -253,6 +253,7 @@ def described_run(
         "target": solver.target,
         "order": solver.order,
         "birealisation": compilation.realisation.kind,
+        "exact": compilation.realisation.exact,
         "step": float(experiment.run.step),
         "steps": trajectory.steps,
         "time": float(trajectory.t[-1]),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import textwrap
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -56,7 +57,8 @@ def _print(compilation: Compilation, most: int | None) -> None:
         _section("Casimirs", _assignments(_named(system.casimirs, most)))
     if system.invariants:
         _section("Invariants", _assignments(_named(system.invariants, most)))
-    _section(f"Bi-realisation: {compilation.realisation.explanation}", _assignments(_maps(compilation, most)))
+    why = textwrap.wrap(compilation.realisation.explanation, 100)
+    _section(f"Bi-realisation: {compilation.realisation.kind}", [*why, *_assignments(_maps(compilation, most))])
     _section(f"Generating function: {method(compilation)}", _assignments(_series(compilation, most)))
     _section("Generated code", _code(compilation))
 

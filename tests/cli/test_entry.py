@@ -159,14 +159,26 @@ def test_closed_pipe_ends_quietly():
 
 def test_interrupt_is_130(write):
     write("a.yaml")
-    command = [*PHIGEN, "run", "a.yaml", "-t", "numpy", "--steps", "100000000"]
+    command = [*PHIGEN, "run", "a.yaml", "-v", "-t", "numpy", "--steps", "2000000"]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    time.sleep(2)
+    assert "numpy ready" in process.stderr.readline()
+    time.sleep(0.3)
     process.send_signal(signal.SIGINT)
     _, message = process.communicate(timeout=60)
     assert process.returncode == 130
     assert "interrupted" in message
     assert "Traceback" not in message
+
+
+def test_interrupt_inside_an_import_is_no_internal_error(phigen, write, monkeypatch):
+    def broken(*args, **kwargs):
+        try:
+            raise KeyboardInterrupt
+        except KeyboardInterrupt:
+            raise ImportError("half a module")  # noqa: B904
+
+    monkeypatch.setattr("phigen.analysis.proof.examine", broken)
+    assert phigen("check", write("a.yaml")).exit_code == 130
 
 
 def test_completion_script_is_offered():

@@ -1,0 +1,70 @@
+"""The shipped examples are the golden files: generated/ is what `phigen build specs` writes, on every machine."""
+
+import os
+import shutil
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from phigen import resources
+from phigen.cli import group
+
+ROOT = resources.bundled_specs().parent
+NAMES = ["lotka_volterra", "kepler", "so4_manakov", "pendulum_euler", "vortices3"]
+BUILD = "from phigen.cli import main; main()"
+
+
+def test_generated_is_what_phigen_build_specs_writes(monkeypatch):
+    monkeypatch.chdir(ROOT)
+    done = CliRunner().invoke(group, ["build", "specs", "--check"], prog_name="phigen")
+    assert done.exit_code == 0, done.stderr
+
+
+def built(tmp_path, environment=None, cwd=None, python=(), specs=None):
+    """The files that a process of its own writes: name → bytes."""
+    specs = specs or resources.bundled_specs()
+    output = tmp_path / f"out{len(list(tmp_path.iterdir()))}"
+    files = [str(specs / f"{name}.yaml") for name in NAMES]
+    command = [sys.executable, *python, "-c", BUILD, "build", *files, "-o", str(output)]
+    env = {k: v for k, v in os.environ.items() if k not in ("PYTHONHASHSEED", "LC_ALL")} | (environment or {})
+    subprocess.run(command, check=True, env=env, cwd=cwd or ROOT, capture_output=True)
+    return {str(p.relative_to(output)): p.read_bytes() for p in sorted(output.rglob("*")) if p.is_file()}
+
+
+def test_output_depends_neither_on_hash_seed_nor_locale_nor_folder(tmp_path):
+    first = built(tmp_path, {"PYTHONHASHSEED": "0", "LC_ALL": "C"})
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    copies = shutil.copytree(resources.bundled_specs(), tmp_path / "copies")
+    environment = {"PYTHONHASHSEED": "4711", "LC_ALL": "tr_TR.UTF-8", "PYTHONPATH": str(ROOT), "TZ": "Asia/Tokyo"}
+    second = built(tmp_path, environment, elsewhere, specs=copies)
+    assert len(first) == 3 * len(NAMES)
+    assert first == second
+
+
+def test_wheel_builds_the_same_bytes_and_carries_its_data(tmp_path):
+    pytest.importorskip("build")
+    dist = tmp_path / "dist"
+    command = [sys.executable, "-m", "build", "--wheel", "--no-isolation", "--outdir", str(dist), str(ROOT)]
+    done = subprocess.run(command, check=False, capture_output=True, text=True)
+    if "No module named" in done.stdout + done.stderr:
+        pytest.skip("no hatchling in this environment")
+    assert done.returncode == 0, done.stdout + done.stderr
+    (wheel,) = dist.iterdir()
+    unpacked = tmp_path / "unpacked"
+    with zipfile.ZipFile(wheel) as archive:
+        archive.extractall(unpacked)
+    work = tmp_path / "work"
+    work.mkdir()
+    environment = {"PYTHONPATH": str(unpacked)}
+    where = subprocess.run(
+        [sys.executable, "-P", "-c", BUILD, "list", "--path", "kepler"],
+        check=True, capture_output=True, text=True, cwd=work, env={**os.environ, **environment},
+    )  # fmt: skip
+    assert Path(where.stdout.strip()).is_relative_to(unpacked)
+    from_wheel = built(tmp_path, environment, work, ("-P",), specs=unpacked / "phigen" / "_data" / "specs")
+    assert from_wheel == built(tmp_path)
