@@ -52,6 +52,13 @@ class BiRealisation:
         """Names of the symbols p, in the order of the coordinates."""
         return covector_names(self.coordinates)
 
+    @property
+    def label(self) -> str:
+        """The kind, and that it is approximate where it is: for every place that names it to the user."""
+        if self.exact:
+            return self.kind
+        return f"{self.kind} (approximate" + (")" if self.degree is None else f", Poisson up to degree {self.degree})")
+
 
 #: A kind of the catalogue: makes the bi-realisation of a system, or raises `SpecError` if it does not apply.
 Builder = Callable[[System, BirealisationChoice], BiRealisation]

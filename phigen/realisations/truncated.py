@@ -69,7 +69,7 @@ def brackets(system: System, realisation: BiRealisation, degree: int) -> Iterato
         return f"({system.coordinates[i]}, {system.coordinates[j]}) in degree {m}"
 
     def decided(name: str, residuals: Iterator[tuple[str, Poly]]) -> Statement:
-        return decide_elements(f"bi-realisation up to degree {degree - 1} in p: {name}", parts.tower, residuals,
+        return decide_elements(f"bi-realisation: {name}, up to degree {degree - 1} in p", parts.tower, residuals,
                                system.positive, "degree by degree; approximate beyond")  # fmt: skip
 
     def own(first: int, sign: int) -> Iterator[tuple[str, Poly]]:
