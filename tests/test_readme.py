@@ -1,0 +1,75 @@
+"""The README's examples, compiled, run, and compared with what it says they print."""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from phigen import resources
+
+ROOT = resources.bundled_specs().parent
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+def blocks():
+    """Pairs (the paragraph before a fenced block, its text), in order."""
+    return re.findall(r"([^\n]*)\n\n```\w+\n(.*?)```", README, flags=re.DOTALL)
+
+
+def block(start):
+    """The block whose introduction starts like this."""
+    found = [text for introduction, text in blocks() if introduction.startswith(start)]
+    assert len(found) == 1, f"the README has {len(found)} blocks introduced by {start!r}"
+    return found[0]
+
+
+@pytest.fixture
+def workshop(tmp_path):
+    """A folder with the README's files, and a path on which `phigen` is this one."""
+    for name in ("tumbler.yaml", "main.c", "example.py"):
+        (tmp_path / name).write_text(block(f"`{name}`"), encoding="utf-8")
+    tools = tmp_path / "tools"
+    tools.mkdir()
+    (tools / "phigen").write_text(f'#!/bin/sh\nexec "{sys.executable}" -c "from phigen.cli import main; main()" "$@"\n')
+    (tools / "phigen").chmod(0o755)
+    environment = {**os.environ, "PATH": f"{tools}{os.pathsep}{os.environ['PATH']}", "PYTHONPATH": str(ROOT)}
+
+    def run(*command):
+        done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stdout + done.stderr
+        return done.stdout
+
+    return run
+
+
+@pytest.mark.skipif(not shutil.which("cc"), reason="needs a C compiler")
+def test_c_example_prints_what_the_readme_says(workshop):
+    commands = block("The commands").strip().splitlines()
+    assert commands[-1] == "./main"
+    for command in commands[:-1]:
+        workshop("sh", "-c", command)
+    assert workshop("./main") == block("What `./main` prints")
+
+
+def test_python_example_prints_what_the_readme_says(workshop):
+    assert workshop(sys.executable, "example.py") == block("What it prints")
+
+
+def test_commands_of_the_text_work(workshop):
+    for command in re.findall(r"`(phigen (?:run|show) [^`]*)`", README.replace("\n", " ")):
+        assert workshop("sh", "-c", command)
+
+
+def test_links_lead_somewhere():
+    for target in re.findall(r"\]\(([^)]+)\)", README):
+        if not target.startswith("https://"):
+            assert (ROOT / target).exists(), target
+
+
+def test_map_names_every_room():
+    rooms = {p.name for p in Path(ROOT / "phigen").iterdir() if p.is_dir() and (p / "__init__.py").exists()}
+    assert {room for room in rooms if f"phigen/{room}/" not in README} == set()
