@@ -45,6 +45,17 @@ def test_declared_casimirs_come_first_and_are_not_repeated():
     assert list(both.casimirs) == ["A", "B"]
 
 
+def test_a_candidate_that_depends_on_a_declared_casimir_is_dropped():
+    s = found("a b c u v w", "{lie_algebra: {name: se(3)}}", "casimirs: {B: 3*(a*u+b*v+c*w)}")
+    assert texts(s.casimirs.values())[1:] == ["w**2 + (v**2 + u**2)"]
+
+
+def test_nothing_is_searched_for_when_all_are_declared():
+    bracket = "{brackets: {x: {y: tanh(z)}}}"
+    assert found("x y z", bracket).notes != ()
+    assert found("x y z", bracket, "casimirs: {C: z}").notes == ()
+
+
 def test_dependent_declared_casimirs_leave_room_for_the_missing_one():
     s = found("a b c u v w", "{lie_algebra: {name: se(3)}}", "casimirs: {A: u**2+v**2+w**2, B: (u**2+v**2+w**2)**3}")
     assert list(s.casimirs) == ["A", "B", "C1"]

@@ -213,3 +213,10 @@ def test_casimirs_of_the_realisations_agree():
             # exp(a)·exp(b)·exp(−a−b) = 1 is beyond the ring: the log-canonical one is checked at points.
             expected = PROVED if s.lie_algebra else CHECKED
             assert decide_zero("C∘α = C∘β", [("", images[0] - images[1])]).verdict == expected
+
+
+@pytest.mark.parametrize(("beta", "pair"), [("[x + p_x, y]", "(x, x)"), ("[x, y + p_x]", "(x, y)")])
+def test_mixed_brackets_are_checked_for_all_pairs(beta, pair):
+    mixed = custom("x y", "{brackets: {}}", "[x, y]", beta)[MIXED]
+    assert mixed.verdict == REFUTED
+    assert mixed.detail.startswith(pair)

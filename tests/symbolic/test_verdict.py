@@ -79,6 +79,11 @@ def test_sample_points_are_moderate_rationals(index):
     assert index % 2 or all(v > 0 for v in point.values())
 
 
+def test_covectors_are_sampled_near_zero():
+    # A bi-realisation lives near p = 0; far from it a root may be on its other branch.
+    assert all(abs(v) <= Fraction(1, 8) for k in range(9) for v in sample_point(["p:x", "p:y"], [], k).values())
+
+
 def test_points_and_verdicts_do_not_depend_on_the_hash_seed():
     code = (
         "from phigen.symbolic.expression import *\nfrom phigen.symbolic.verdict import *\n"

@@ -1,0 +1,27 @@
+"""Generic rank."""
+
+from phigen.geometry.rank import generic_ranks
+from phigen.symbolic.expression import ONE, ZERO, call, number, sqrt, symbol
+from phigen.symbolic.verdict import sample_point
+
+x, y = symbol("x"), symbol("y")
+
+
+def test_an_unlucky_point_does_not_lower_the_rank():
+    zero_there = x - number(sample_point(["x"], [], 0)["x"])
+    assert generic_ranks([[[zero_there, ZERO], [ZERO, ONE]]]) == [2]
+
+
+def test_functions_are_evaluated_far_beyond_double_precision():
+    # sin² + cos² − 1 is rounding error, 1e-30·exp(x) is not.
+    zero = call("sin", x) ** 2 + call("cos", x) ** 2 - 1
+    assert generic_ranks([[[zero, ONE], [ZERO, ONE]], [[call("exp", x) / 10**30, ZERO], [ZERO, ONE]]]) == [1, 2]
+
+
+def test_points_outside_the_domain_are_skipped():
+    assert generic_ranks([[[sqrt(x - 1) * call("log", y - 2)]]]) == [1]
+    assert generic_ranks([[[sqrt(-(x**2))]]]) is None
+
+
+def test_empty_matrices_have_rank_zero():
+    assert generic_ranks([[], [[x]]]) == [0, 1]
