@@ -63,6 +63,7 @@ def compile_spec(spec: Spec, *, order: int | None = None, system: System | None 
             realisation,
             plan,
             composition=spec.composition,
+            gauge=spec.gauge,
             solver=spec.solver,
             title=spec.title,
             licence=spec.license,

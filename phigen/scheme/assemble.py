@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from phigen.geometry.shapes import LogCanonical
 from phigen.geometry.system import System
 from phigen.realisations.protocol import BiRealisation
 from phigen.scheme.discretisation import MOST_OPERATIONS, discretise, too_large
+from phigen.scheme.gauge import choose
+from phigen.scheme.gauge import kernels as gauge_kernels
 from phigen.scheme.generating import STEP
 from phigen.scheme.kernels import observables, path_kernels, step_kernels
 from phigen.scheme.lowering import cost, operation_counts
@@ -13,6 +17,7 @@ from phigen.scheme.order import Order
 from phigen.scheme.path import build_path
 from phigen.scheme.program import Kernel, Output, Program
 from phigen.spec.model import SolverOptions
+from phigen.symbolic.expression import Expression
 
 DRIVERS = {
     "explicit": "explicit",
@@ -27,6 +32,7 @@ def build_program(
     order: Order,
     *,
     composition: str = "auto",
+    gauge: str | Mapping[str, Expression] = "none",
     solver: SolverOptions | None = None,
     title: str = "",
     licence: str = "0BSD",
@@ -34,7 +40,8 @@ def build_program(
 ) -> Program:
     """The solver of a system as a program. LimitError if a kernel exceeds `MOST_OPERATIONS`."""
     solver = solver or SolverOptions()
-    scheme = discretise(system, realisation, order, composition)
+    gauge_of = choose(system, realisation, gauge)
+    scheme = discretise(gauge_of.applied(system), realisation, order, composition, static=gauge_of.symbols)
     generating = scheme.generating
     coefficients = generating.coefficients
     path = build_path(system, coefficients) if realisation.path else None
@@ -43,11 +50,11 @@ def build_program(
     else:
         kernels = step_kernels(system, realisation, generating, coefficients)
     driver = "path" if path else "explicit" if "explicit" in kernels else "newton"
-    kernels |= observables(system)
+    kernels |= observables(system) | gauge_kernels(system, realisation, gauge_of)
     prepare = Kernel(
         "prepare",
         "everything that depends on parameters and step size only",
-        {"params": system.parameter_names, "h": (STEP,)},
+        {"params": system.parameter_names, **gauge_of.inputs, "h": (STEP,)},
         (Output("coef", tuple(coefficients.values)),),
     )
     main = kernels[{"path": "generate", "newton": "linearise"}.get(driver, driver)]
@@ -58,6 +65,7 @@ def build_program(
         *approximation(realisation),
         f"generating function: {'S_1' if scheme.terms == 1 else f'S_1 ... S_{scheme.terms}'} ({generating.form}"
         + (f", {generating.terms} terms)" if generating.terms else ")"),
+        *gauge_of.facts,
         f"step: {DRIVERS[driver]}",
     ]
     return Program(
@@ -71,6 +79,7 @@ def build_program(
         coefficients=len(coefficients.values),
         kernels={"prepare": prepare, **kernels},
         path=path,
+        gauge=gauge_of.free,
         fractions=scheme.fractions,
         relative=isinstance(system.shape, LogCanonical),
         symmetric=realisation.symmetric,

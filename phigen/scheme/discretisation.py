@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from phigen.errors import Diagnostic, LimitError, SpecError
@@ -32,21 +33,24 @@ def formal_alpha(system: System, realisation: BiRealisation, terms: int) -> tupl
     return tuple(karasev.series(system, terms - 1)) if realisation.path and terms > 1 else realisation.alpha
 
 
-def series_of(system: System, realisation: BiRealisation, terms: int) -> PolynomialSeries:
-    """S_1 … S_terms in a tower that also contains the step size."""
+def series_of(system: System, realisation: BiRealisation, terms: int, static: Sequence[str] = ()) -> PolynomialSeries:
+    """S_1 … S_terms in a tower that also contains the step size and other ``static`` symbols."""
     return polynomial_series(
         system.hamiltonian,
         formal_alpha(system, realisation, terms),
         system.coordinates,
-        [*system.parameter_names, STEP],
+        [*system.parameter_names, *static, STEP],
         terms,
         symmetric=realisation.symmetric,
     )
 
 
-def generating_function(system: System, realisation: BiRealisation, terms: int) -> GeneratingFunction:
+def generating_function(
+    system: System, realisation: BiRealisation, terms: int, extra: Sequence[str] = ()
+) -> GeneratingFunction:
     """∇S_h and Hess S_h in the cheapest form. LimitError if every form is too large."""
-    coordinates, static, symmetric = system.coordinates, system.parameter_names, realisation.symmetric
+    coordinates, symmetric = system.coordinates, realisation.symmetric
+    static = [*system.parameter_names, *extra]
     candidates = []
     if terms <= GRAPH_TERMS:
         alpha = formal_alpha(system, realisation, terms)
@@ -54,7 +58,7 @@ def generating_function(system: System, realisation: BiRealisation, terms: int) 
         candidates.append(graph_form(graph, coordinates, static))
     worth = min((c.cost() for c in candidates), default=MOST_OPERATIONS)
     try:
-        series = series_of(system, realisation, terms)
+        series = series_of(system, realisation, terms, extra)
         candidates = [*collected_form(series, coordinates, static, worth), *candidates]
     except OverflowError:
         pass
@@ -73,29 +77,33 @@ class Discretisation:
     note: str = ""
 
 
-def discretise(system: System, realisation: BiRealisation, order: Order, composition: str) -> Discretisation:
+def discretise(
+    system: System, realisation: BiRealisation, order: Order, composition: str, static: Sequence[str] = ()
+) -> Discretisation:
     """The direct series, or a symmetric composition of the method of order 2 where that was asked for or is cheaper.
 
     ``auto`` composes only if the direct series is beyond the budget or costs more than `DIRECT_WORTH` times
     the stages of a composition, since its error constant is much smaller.
     """
     if composition not in ("auto", "none"):
-        return _composed(system, realisation, order, composition)
+        return _composed(system, realisation, order, composition, static)
     possible = composition == "auto" and realisation.symmetric and find("auto", order.order) is not None
     try:
-        direct = Discretisation(generating_function(system, realisation, order.terms), order.terms)
+        direct = Discretisation(generating_function(system, realisation, order.terms, static), order.terms)
     except LimitError:
         if not possible:
             raise
-        return _composed(system, realisation, order, "auto")
+        return _composed(system, realisation, order, "auto", static)
     if not possible or direct.generating.cost() < COMPOSE_ABOVE:
         return direct
-    composed = _composed(system, realisation, order, "auto")
+    composed = _composed(system, realisation, order, "auto", static)
     price = DIRECT_WORTH * len(composed.fractions) * (composed.generating.cost() + system.dimension**2)
     return composed if direct.generating.cost() > price else direct
 
 
-def _composed(system: System, realisation: BiRealisation, order: Order, name: str) -> Discretisation:
+def _composed(
+    system: System, realisation: BiRealisation, order: Order, name: str, static: Sequence[str]
+) -> Discretisation:
     found = find(name, order.order)
     if found is None or not realisation.symmetric:
         reason = (
@@ -106,7 +114,7 @@ def _composed(system: System, realisation: BiRealisation, order: Order, name: st
         place = system.locations.get(("composition",)) or system.locations.get(("order",))
         raise SpecError([Diagnostic(reason, place, "composition: none takes the series directly")])
     note = f"composition: {found.name}, {len(found.fractions)} stages of order 2"
-    return Discretisation(generating_function(system, realisation, 1), 1, found.fractions, note)
+    return Discretisation(generating_function(system, realisation, 1, static), 1, found.fractions, note)
 
 
 def too_large(system: System, reason: str) -> LimitError:

@@ -51,7 +51,7 @@ class Program:
     """A solver, ready to be printed. ``driver`` is ``newton``, ``explicit`` or ``path``.
 
     ``path`` holds the recurrences of a path driver. A step of size h is the composition of one step of each
-    of the ``fractions`` of h.
+    of the ``fractions`` of h. ``gauge`` names the Casimirs whose multiple the solver chooses for each trajectory.
 
     ``relative`` tells that the coordinates are positive or keep their sign (log-canonical π), so that errors
     of the inner solve count relative to each coordinate. ``facts`` are the lines of the header.
@@ -68,6 +68,7 @@ class Program:
     kernels: Mapping[str, Kernel]
     path: Path | None = None
     fractions: tuple[float, ...] = (1.0,)
+    gauge: tuple[str, ...] = ()
     relative: bool = False
     symmetric: bool = True
     max_iterations: int = 20

@@ -16,7 +16,6 @@ from phigen.spec.kinds import (
     Name,
     Record,
     Text,
-    Unavailable,
 )
 from phigen.spec.names import (
     BIREALISATIONS,
@@ -166,9 +165,9 @@ SPEC = Record(
         Field("composition", _switch("composition", *COMPOSITIONS), "symmetric composition of steps", default="auto"),
         Field(
             "gauge",
-            Either({Scalar: _switch("gauge", "auto", "none"), Mapping: Unavailable()}),
+            Either({Scalar: _switch("gauge", "auto", "none"), Mapping: FORMULAS}),
             "Casimirs subtracted from H before discretising",
-            default="auto",
+            default="none",
         ),
         Field("scheme", _switch("scheme", "auto"), "how the one-step map is arranged", default="auto"),
         Field("solver", SOLVER, "the inner solve of a step"),

@@ -71,7 +71,27 @@ class NambuForm:
     casimirs: tuple[Expression, ...]
 
 
-PoissonForm = MatrixForm | CanonicalForm | LogCanonicalForm | LieAlgebraForm | NambuForm
+@dataclass(frozen=True)
+class ProductForm:
+    """Blocks side by side, as pairs (coordinates, form); every coordinate is in exactly one of them."""
+
+    blocks: tuple[tuple[tuple[str, ...], PoissonForm], ...]
+
+
+@dataclass(frozen=True)
+class PullbackForm:
+    """A structure in other coordinates y: ``of`` is its form, ``map`` gives y as expressions in the spec's x.
+
+    ``inverse`` gives x as expressions in y, if the spec does.
+    """
+
+    coordinates: tuple[str, ...]
+    of: PoissonForm
+    map: tuple[Expression, ...]
+    inverse: tuple[Expression, ...] | None = None
+
+
+PoissonForm = MatrixForm | CanonicalForm | LogCanonicalForm | LieAlgebraForm | NambuForm | ProductForm | PullbackForm
 
 
 @dataclass(frozen=True)
@@ -85,6 +105,8 @@ class BirealisationChoice:
     alpha: tuple[Expression, ...] = ()
     beta: tuple[Expression, ...] = ()
     side: str = "q"  # canonical-euler
+    of: str = "auto"  # product, pullback: the kind for the blocks, for the structure that is pulled back
+    tau: Expression | Matrix | None = None  # group-map: f(P) with the symbol P:, or the entries of τ in p:NAME
     spray: str | tuple[Expression, ...] = "auto"  # spray: auto, flat, natural or the components f_j(x, p)
     degree: int | None = None  # spray: degree in p of a truncation, None for what the order needs
     order: int | None = None
@@ -130,7 +152,7 @@ class Spec:
     order: int | None = None  # exactly one of order and terms is set
     terms: int | None = None
     composition: str = "auto"
-    gauge: str = "none"
+    gauge: str | Mapping[str, Expression] = "none"  # or the multiple of each Casimir
     scheme: str = "auto"
     solver: SolverOptions = SolverOptions()
     targets: tuple[str, ...] = ("c", "numpy")

@@ -16,7 +16,7 @@ from phigen.spec.poisson import poisson_form
 from phigen.spec.problems import Problems, counted, did_you_mean, shown
 from phigen.spec.runs import run, without_repetition
 from phigen.spec.yaml_source import Scalar, decode, read
-from phigen.symbolic.expression import ZERO, Expression, symbol
+from phigen.symbolic.expression import ZERO, Expression, symbol, symbols_of
 
 DEFAULT_ORDER = 4
 #: Options of bi-realisations and the kind that each belongs to.
@@ -53,8 +53,7 @@ def _parts(raw: Mapping[str, Any], declared: Declarations) -> dict[str, Any]:
         "order": raw.get("order", None if "terms" in raw else DEFAULT_ORDER),
         "terms": raw.get("terms"),
         "composition": raw.get("composition", "auto"),
-        # There is nothing to choose from yet, so that auto is none.
-        "gauge": "none",
+        "gauge": _gauge(raw.get("gauge", "none"), declared),
         "scheme": raw.get("scheme", "auto"),
         "solver": _solver(raw.get("solver", {}), declared),
         "targets": without_repetition(raw.get("targets", ("c", "numpy")), ("targets",), declared),
@@ -83,6 +82,22 @@ def _formulas(given: Mapping[str, tuple[Scalar, Scalar | None]], declared: Decla
     scope = declared.scope()
     values = {name: declared.formula(node, scope) for name, (_, node) in given.items()}
     return {name: value for name, value in values.items() if value is not None}
+
+
+def _gauge(
+    given: str | Mapping[str, tuple[Scalar, Scalar | None]], declared: Declarations
+) -> str | dict[str, Expression]:
+    """auto, none, or the multiples of Casimirs: constants along trajectories, hence free of coordinates."""
+    if isinstance(given, str):
+        return given
+    values = _formulas(given, declared)
+    for name, value in values.items():
+        moving = [s for s in symbols_of(value) if s in declared.coordinates]
+        if moving:
+            place = declared.reader.locations["gauge", name]
+            message = f"gauge: the multiple of {name} must not depend on coordinates, and {moving[0]} is one"
+            declared.reader.problems.add(message, place, "numbers and parameters are fine")
+    return values
 
 
 def _license(given: str, declared: Declarations) -> str:

@@ -29,8 +29,12 @@ class Syntax:
 
 
 def statements(program: Program, path: Path, syntax: Syntax) -> dict[str, list[str]]:
-    """Statements by purpose: ``fixed`` values, ``first`` coefficients, ``rules`` for order k, ``slopes``."""
-    show = syntax.printer(_scope(program, path, syntax))
+    """Statements by purpose: ``fixed`` values, ``first`` coefficients, ``rules`` for order k, ``slopes``.
+
+    ``nodes`` assigns the values of all series at one point to e[i] (no semicolon), ``field`` lists those of ṁ.
+    """
+    show = syntax.printer(_scope(program, path, syntax, "s[{i}][0]"))
+    show_node = syntax.printer(_scope(program, path, syntax, "e[{i}]"))
 
     def text(e: Expression) -> str:
         return show(expand_powers([e])[0])
@@ -41,6 +45,8 @@ def statements(program: Program, path: Path, syntax: Syntax) -> dict[str, list[s
         "first": [syntax.first.format(i=i, value=text(q.first)) for i, q in derived],
         "rules": [syntax.following.format(i=i, value=_rule(q, text, syntax.sums)) for i, q in derived],
         "slopes": [syntax.slope.format(i=i, slope=slope) for i, slope in enumerate(path.slopes)],
+        "nodes": [f"e[{i}] = {show_node(expand_powers([q.first])[0])}" for i, q in derived],
+        "field": [f"e[{slope}]" for slope in path.slopes],
     }
 
 
@@ -55,14 +61,14 @@ def kinds(path: Path) -> list[str]:
     return [k for k in ("product", "chain", "power") if any(t.kind == k for q in path.series for t in q.terms)]
 
 
-def _scope(program: Program, path: Path, syntax: Syntax) -> Scope:
+def _scope(program: Program, path: Path, syntax: Syntax, series: str) -> Scope:
     scope = Scope(())
     for i, c in enumerate(program.coordinates):
         scope.bind(f"p:{c}", syntax.covector.format(i=i))
     for i in range(program.coefficients):
         scope.bind(f"c:{i}", f"coef[{i}]")
     for i in range(len(path.series)):
-        scope.bind(f"s:{i}", f"s[{i}][0]")
+        scope.bind(f"s:{i}", series.format(i=i))
     for i in range(len(path.fixed)):
         scope.bind(f"f:{i}", f"f{i}")
     return scope

@@ -5,7 +5,7 @@ import pytest
 from support import BODY, NAMES, compile_text, compiled, values
 
 from phigen.errors import LimitError
-from phigen.scheme import discretisation
+from phigen.scheme import assemble, discretisation
 from phigen.scheme.discretisation import GRAPH_TERMS, generating_function, series_of
 from phigen.scheme.order import Order, plan_order
 from phigen.scheme.collected import collect
@@ -100,6 +100,7 @@ def test_collected_polynomials_differentiate_like_the_tower():
 
 def test_a_program_beyond_the_budget_is_refused_with_a_hint(monkeypatch):
     monkeypatch.setattr(discretisation, "MOST_OPERATIONS", 100)
+    monkeypatch.setattr(assemble, "MOST_OPERATIONS", 100)
     with pytest.raises(LimitError) as caught:
         compile_text(BODY + "order: 6\n")
     assert "order" in str(caught.value)

@@ -55,6 +55,7 @@ def _values(program: Program) -> dict[str, object]:
         "casimir_size": max(1, len(program.casimirs)),
         "version": program.version,
         "sha256": program.spec_sha256,
+        **_gauge_values(program),
         "stages": len(program.fractions),
         "fractions": ", ".join(repr(f) for f in program.fractions),
         "terms": TERMS,
@@ -77,12 +78,41 @@ def _values(program: Program) -> dict[str, object]:
     }
 
 
+def _gauge_values(program: Program) -> dict[str, object]:
+    name, count = program.name, len(program.gauge)
+    if not count:
+        nothing: dict[str, object] = dict.fromkeys(("gauge_members", "gauge_declarations", "gauge_init"), ())
+        return nothing | {"gauges": 0, "products": 0, "prepare_arguments": "&s->params"}
+    said = "start at x0 with a gauge of one's own: the step is an exact Poisson map for each fixed gauge"
+    return {
+        "gauges": count,
+        "products": 1 + 2 * count,
+        "prepare_arguments": "&s->params, s->gauge",
+        "gauge_members": [f"double gauge[{count}]; /* multiples of {', '.join(program.gauge)} taken from H */"],
+        "gauge_declarations": [
+            f"/* {said.capitalize()}. */",
+            *_init_gauge(program)[:-1],
+            _init_gauge(program)[-1] + ";\n",
+        ],
+        "gauge_init": [f"{name}_choose_gauge(&s->params, s->x, s->gauge);"],
+    }
+
+
+def _init_gauge(program: Program) -> list[str]:
+    name, n = program.name, program.dimension
+    arguments = [f"{name}_solver *s", f"const {name}_params *params", f"const double x0[{n}]"]
+    return wrapped_arguments(
+        f"{name}_status {name}_init_gauge(", [*arguments, f"const double gauge[{len(program.gauge)}]"]
+    )
+
+
 def _signatures(program: Program) -> dict[str, list[str]]:
     """Signatures that are too long for one line with a long name."""
     name, n = program.name, program.dimension
     solver, params, status = f"{name}_solver *s", f"const {name}_params *params", f"{name}_status "
     many = ["double *x", "size_t members", "double h", "size_t steps", "unsigned char *status"]
     return {
+        "init_gauge": _init_gauge(program),
         "init": wrapped_arguments(f"{status}{name}_init(", [solver, params, f"const double x0[{n}]"]),
         "ensemble": wrapped_arguments(f"{status}{name}_ensemble(", [params, *many]),
         "hamiltonian": wrapped_arguments(f"double {name}_hamiltonian(", [params, f"const double x[{n}]"]),
@@ -131,6 +161,9 @@ def _body(program: Program) -> str:
     else:
         pieces += [static("explicit"), _render("explicit.c", values)]
     pieces.append(_render("compose.c", values))
+    if program.gauge:
+        pieces += [static("guide"), static("products"), _render("gauge.c", values)]
+        pieces.append(_render("choose_gauge.c", values))
     pieces += [_render("api.c", values), static("energy"), exported("casimirs"), exported("vector_field")]
     if any(apart(program) in piece for piece in pieces):
         pieces.insert(1, _render("apart.c", values))

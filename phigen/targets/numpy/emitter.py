@@ -64,6 +64,8 @@ def emit(program: Program, command: str) -> dict[str, str]:
     else:
         pieces += [_function(program, kernels["linearise"]), render("numpy", "solve.py", _values(program))]
         pieces += [render("numpy", "newton.py", _values(program))]
+    pieces.append(render("numpy", "gauge.py" if program.gauge else "no_gauge.py", _values(program)))
+    pieces += [_function(program, kernels[k]) for k in ("guide", "products") if k in kernels]
     pieces += [render("numpy", "api.py", _values(program))]
     pieces += [_function(program, kernels[k]) for k in ("energy", "casimirs", "vector_field")]
     pieces += [render("numpy", "observables.py", _values(program))]
@@ -82,6 +84,7 @@ def _values(program: Program) -> dict[str, object]:
         "coordinates": _strings(program.coordinates),
         "casimirs": _strings(program.casimirs),
         "defaults": [f'"{p.name}": {float(p.value)!r}' for p in program.parameters],
+        "gauge": _strings(program.gauge),
         "fractions": "(" + "".join(f"{f!r}, " for f in program.fractions).rstrip() + ")",
         "terms": TERMS,
         "series": len(program.path.series) if program.path else 0,
@@ -138,7 +141,7 @@ def _result(program: Program, kernel: Kernel, code: Code, printer: Printer) -> s
         values[s.array].append(s.value)
     if kernel.name == "prepare":
         return "    return " + _list([printer(v) for v in values["coef"]])
-    state = next(a for a in kernel.inputs if a not in ("coef", "params"))
+    state = next(a for a in kernel.inputs if a not in ("coef", "params", "gauge"))
     n = program.dimension
     arrays = []
     for name, entries in values.items():

@@ -1,0 +1,141 @@
+"""The Casimir gauge: H and H − Σ λ_c C_c have the same flow, but not the same discretisation.
+
+Casimirs subtracted from H before discretising change S_h, hence the error constant: the leading local error of a
+symmetric method is h³ π∇S_3 at order 2, and |π∇S_3| is a good guide for higher orders. ``auto`` leaves λ open and
+lets the solver fix it at the start of each trajectory by minimising |π∇S_3| along a short piece of it. For each
+fixed λ the step is an exact Poisson map; trajectories with different λ are steps of different maps.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+from phigen.errors import Diagnostic, SpecError
+from phigen.geometry.system import System, hamiltonian_vector_field
+from phigen.realisations.protocol import BiRealisation
+from phigen.scheme.program import Kernel, Output
+from phigen.series.hamilton_jacobi import PolynomialSeries, polynomial_series
+from phigen.symbolic.expression import Expression, gradient, symbol, total
+
+#: Gauged series may have this many times the terms of the plain one; beyond, the gauge costs more than it gains.
+MOST_GROWTH = 1.3
+
+#: The error term whose size the gauge minimises.
+GUIDE = 3
+
+
+@dataclass(frozen=True)
+class Gauge:
+    """``free``: Casimirs whose λ the solver chooses; ``fixed``: the part subtracted once for all."""
+
+    free: tuple[str, ...] = ()
+    fixed: Mapping[str, Expression] = field(default_factory=dict)
+
+    @property
+    def symbols(self) -> tuple[str, ...]:
+        """The symbols of the free λ."""
+        return tuple(f"gauge:{name}" for name in self.free)
+
+    @property
+    def inputs(self) -> dict[str, tuple[str, ...]]:
+        """The argument that passes the free λ to a kernel, if there are any."""
+        return {"gauge": self.symbols} if self.free else {}
+
+    @property
+    def facts(self) -> list[str]:
+        """What the header says of the gauge."""
+        free = [f"gauge: the multiple of {', '.join(self.free)} is chosen at the start of each trajectory"]
+        fixed = ", ".join(f"({value}) {name}" for name, value in self.fixed.items())
+        return (free if self.free else []) + ([f"gauge: H - {fixed}"] if fixed else [])
+
+    def applied(self, system: System) -> System:
+        """The system with H − Σ λ_c C_c for H, to be discretised; its vector field is that of the system."""
+        parts = [symbol(s) * system.casimirs[c] for s, c in zip(self.symbols, self.free, strict=True)]
+        parts += [value * system.casimirs[c] for c, value in self.fixed.items()]
+        return replace(system, hamiltonian=system.hamiltonian - total(parts)) if parts else system
+
+
+def choose(system: System, realisation: BiRealisation, setting: str | Mapping[str, Expression]) -> Gauge:
+    """The gauge of a setting: ``none``, ``auto``, or a value for some Casimirs.
+
+    ``auto`` frees a Casimir if S_3 depends on its λ (in log-canonical structures it never does) and has hardly
+    more terms with it (on tops it has many more, for little).
+    """
+    if not isinstance(setting, str):
+        for name in setting:
+            if name not in system.casimirs:
+                known = ", ".join(system.casimirs) or "none"
+                place = system.locations.get(("gauge", name)) or system.locations.get(("gauge",))
+                raise SpecError(
+                    [Diagnostic(f"gauge: {name} is not a Casimir of this system", place, f"known: {known}")]
+                )
+        return Gauge(fixed=setting)
+    if setting == "none" or not realisation.exact or not realisation.symmetric:
+        return Gauge()
+    free: list[str] = []
+    plain = _guide(system, realisation, Gauge())
+    for name in system.casimirs:
+        gauged = _guide(system, realisation, Gauge((*free, name)))
+        if gauged is not None and plain is not None and _worthwhile(plain, gauged, system, f"gauge:{name}"):
+            free.append(name)
+    return Gauge(tuple(free))
+
+
+def _guide(system: System, realisation: BiRealisation, gauge: Gauge) -> PolynomialSeries | None:
+    from phigen.scheme.discretisation import formal_alpha
+
+    gauged = gauge.applied(system)
+    try:
+        return polynomial_series(
+            gauged.hamiltonian,
+            formal_alpha(gauged, realisation, GUIDE),
+            system.coordinates,
+            [*system.parameter_names, *gauge.symbols],
+            GUIDE,
+            symmetric=True,
+        )
+    except OverflowError:
+        return None
+
+
+def _worthwhile(plain: PolynomialSeries, gauged: PolynomialSeries, system: System, name: str) -> bool:
+    if not gauged.tower.depends_on(gauged.terms[GUIDE - 1], [name]):
+        return False
+    before, after = (_state_terms(s, system) for s in (plain, gauged))
+    return after <= MOST_GROWTH * before
+
+
+def _state_terms(series: PolynomialSeries, system: System) -> int:
+    """Number of monomials in the coordinates in S_1 and S_3 together."""
+    tower = series.tower
+    state = [i for i in range(len(tower.names)) if tower.depends_on(tower.gens[i], system.coordinates)]
+    return len({tuple(int(m[i]) for i in state) for s in series.terms for m in s.to_dict()})
+
+
+def kernels(system: System, realisation: BiRealisation, gauge: Gauge) -> dict[str, Kernel]:
+    """What the solver needs to choose λ: the error π∇S_3, and products of ∇H and the ∇C, which set the scale."""
+    series = _guide(system, realisation, gauge)
+    if not gauge.free or series is None:
+        return {}
+    tower = series.tower
+    slope = [tower.expression(tower.derivative(series.terms[GUIDE - 1], c)) for c in system.coordinates]
+    h = gradient(system.hamiltonian, system.coordinates)
+    products: list[Expression] = [total(a * a for a in h)]
+    for name in gauge.free:
+        c = gradient(system.casimirs[name], system.coordinates)
+        products += [total(a * b for a, b in zip(h, c, strict=True)), total(b * b for b in c)]
+    return {
+        "guide": Kernel(
+            "guide",
+            "the leading error vector pi grad S_3, as a function of the gauge",
+            {"params": system.parameter_names, **gauge.inputs, "x": system.coordinates},
+            (Output("error", hamiltonian_vector_field(system.poisson, slope)),),
+        ),
+        "products": Kernel(
+            "products",
+            "grad H . grad H, then grad H . grad C and grad C . grad C for each Casimir of the gauge",
+            {"params": system.parameter_names, "x": system.coordinates},
+            (Output("out", tuple(products)),),
+        ),
+    }
