@@ -73,3 +73,31 @@ def test_links_lead_somewhere():
 def test_map_names_every_room():
     rooms = {p.name for p in Path(ROOT / "phigen").iterdir() if p.is_dir() and (p / "__init__.py").exists()}
     assert {room for room in rooms if f"phigen/{room}/" not in README} == set()
+
+
+def test_reference_of_the_format_names_every_key_and_choice():
+    from phigen import spec
+    from phigen.spec import names
+
+    text = (ROOT / "docs" / "spec.md").read_text(encoding="utf-8")
+    words = set(re.findall(r"[\w-]+", text))
+    expected = {*spec.schema()["properties"], *names.BIREALISATIONS, *names.POISSON_FORMS, *names.COMPOSITIONS}
+    expected |= {*names.CLASSICAL_METHODS, *names.SPEC_FUNCTIONS}
+    assert expected - words == set()
+
+
+def test_example_of_the_format_is_a_good_spec():
+    from phigen import spec
+
+    text = (ROOT / "docs" / "spec.md").read_text(encoding="utf-8")
+    assert spec.loads(re.search(r"```yaml\n(.*?)```", text, flags=re.DOTALL)[1]).order == 6
+
+
+def test_commands_and_exit_codes_are_documented():
+    from phigen import errors
+    from phigen.cli import COMMANDS
+
+    text = (ROOT / "docs" / "commands.md").read_text(encoding="utf-8")
+    assert all(f"`phigen {command}" in text for command in COMMANDS)
+    codes = {e.exit_code for e in vars(errors).values() if isinstance(e, type) and issubclass(e, errors.PhigenError)}
+    assert all(f"| {code} |" in text for code in codes)
