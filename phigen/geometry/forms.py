@@ -7,9 +7,26 @@ from collections.abc import Sequence
 from phigen.errors import Diagnostic, SpecError
 from phigen.geometry import families, matrix_algebras
 from phigen.geometry.lie_algebra import LieAlgebra
-from phigen.geometry.shapes import Matrix, skew
-from phigen.spec.model import CanonicalForm, LieAlgebraForm, LogCanonicalForm, MatrixForm, NambuForm, PoissonForm
-from phigen.symbolic.expression import ONE, Expression, gradient, symbol, total
+from phigen.geometry.pullback import pulled_back
+from phigen.geometry.shapes import LiePoisson, Matrix, Shape, recognise, skew
+from phigen.spec.model import (
+    CanonicalForm,
+    LieAlgebraForm,
+    LogCanonicalForm,
+    MatrixForm,
+    NambuForm,
+    PoissonForm,
+    ProductForm,
+    PullbackForm,
+)
+from phigen.symbolic.expression import ONE, ZERO, Expression, gradient, symbol, symbols_of, total
+
+
+def structure(form: PoissonForm, coordinates: Sequence[str]) -> tuple[Matrix, Shape]:
+    """π of a form, and its shape; raises `SpecError` as `algebra_of_form` and `poisson_matrix`."""
+    algebra = algebra_of_form(form, coordinates)
+    matrix = poisson_matrix(form, coordinates, algebra)
+    return matrix, LiePoisson(algebra) if algebra and algebra.constants else recognise(coordinates, matrix)
 
 
 def poisson_matrix(form: PoissonForm, coordinates: Sequence[str], algebra: LieAlgebra | None = None) -> Matrix:
@@ -30,6 +47,10 @@ def poisson_matrix(form: PoissonForm, coordinates: Sequence[str], algebra: LieAl
             return tuple(tuple(a[i][j] * (x[i] * x[j]) for j in range(n)) for i in range(n))
         case NambuForm(casimirs):
             return _nambu(coordinates, casimirs)
+        case ProductForm(blocks):
+            return _product(coordinates, blocks)
+        case PullbackForm():
+            return pulled_back(form, coordinates)
         case LieAlgebraForm():
             algebra = algebra or algebra_of_form(form, coordinates)
             assert algebra is not None
@@ -65,6 +86,23 @@ def _canonical(coordinates: Sequence[str], q: Sequence[str], p: Sequence[str]) -
         i, j = index[position], index[momentum]
         upper[min(i, j), max(i, j)] = ONE if i < j else -ONE
     return skew(upper, len(coordinates))
+
+
+def _product(coordinates: Sequence[str], blocks: Sequence[tuple[tuple[str, ...], PoissonForm]]) -> Matrix:
+    """Block-diagonal π; raises `SpecError` for a block that depends on coordinates of another."""
+    index = {c: i for i, c in enumerate(coordinates)}
+    n = range(len(coordinates))
+    entries = [[ZERO for _ in n] for _ in n]
+    for names, form in blocks:
+        matrix = poisson_matrix(form, names)
+        foreign = [s for s in symbols_of(*(e for row in matrix for e in row)) if s in index and s not in names]
+        if foreign:
+            message = f"product: the block ({', '.join(names)}) depends on {foreign[0]}, a coordinate of another block"
+            raise SpecError([Diagnostic(message)])
+        for a, row in zip(names, matrix, strict=True):
+            for b, entry in zip(names, row, strict=True):
+                entries[index[a]][index[b]] = entry
+    return tuple(map(tuple, entries))
 
 
 def _nambu(coordinates: Sequence[str], casimirs: Sequence[Expression]) -> Matrix:

@@ -8,6 +8,7 @@ from math import gcd, lcm
 from typing import Any, Generic, TypeVar
 
 from phigen.geometry.field import Field, Scalar
+from phigen.symbolic.expression import Expression
 from phigen.symbolic.tower import rational
 
 Key = TypeVar("Key", bound=Any)
@@ -120,3 +121,28 @@ def coprime_integers(vector: Mapping[Any, Scalar]) -> dict[Any, int]:
     common = gcd(*integers.values())
     sign = 1 if next(iter(integers.values())) > 0 else -1
     return {k: sign * v // common for k, v in integers.items()}
+
+
+def inverse_matrix(rows: Sequence[Sequence[Expression]]) -> tuple[tuple[Expression, ...], ...]:
+    """The inverse of a square matrix of expressions, its entries in lowest terms; ZeroDivisionError if it is singular.
+
+    Functions of symbols count as independent symbols, as in `Field`.
+    """
+    field = Field(e for row in rows for e in row)
+    n = len(rows)
+    left = [[field.convert(e) for e in row] for row in rows]
+    right = [[field.number(int(i == j)) for j in range(n)] for i in range(n)]
+    for k in range(n):
+        pivot = next((i for i in range(k, n) if left[i][k] != 0), None)
+        if pivot is None:
+            raise ZeroDivisionError("the matrix is singular")
+        for side in (left, right):
+            side[k], side[pivot] = side[pivot], side[k]
+        scale = field.one / left[k][k]
+        left[k], right[k] = ([v * scale for v in side[k]] for side in (left, right))
+        for i in range(n):
+            factor = left[i][k]
+            if i != k and factor != 0:
+                for side in (left, right):
+                    side[i] = [v - factor * w for v, w in zip(side[i], side[k], strict=True)]
+    return tuple(tuple(field.expression(v) for v in row) for row in right)

@@ -8,9 +8,9 @@ from typing import Any
 
 from phigen.errors import Diagnostic, Location, SpecError
 from phigen.geometry.casimirs import found_casimirs
-from phigen.geometry.forms import algebra_of_form, poisson_matrix
+from phigen.geometry.forms import structure
 from phigen.geometry.lie_algebra import LieAlgebra
-from phigen.geometry.shapes import LiePoisson, Matrix, Shape, recognise
+from phigen.geometry.shapes import LiePoisson, Matrix, Shape
 from phigen.spec.model import Parameter, PoissonForm, Spec
 from phigen.symbolic.expression import Expression, gradient, total
 
@@ -122,11 +122,9 @@ def build_system(
     locations = locations or {}
     declared = dict(casimirs or {})
     try:
-        algebra = algebra_of_form(form, coordinates)
-        matrix = poisson_matrix(form, coordinates, algebra)
+        matrix, shape = structure(form, coordinates)
     except SpecError as error:
         raise _located(error, locations) from None
-    shape: Shape = LiePoisson(algebra) if algebra and algebra.constants else recognise(coordinates, matrix)
     taken = {*coordinates, *(p.name for p in parameters), *declared, *(invariants or {})}
     found, notes = found_casimirs(coordinates, matrix, shape, form, declared, taken)
     return System(

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 from phigen.errors import SpecError
+from phigen.geometry.blocks import blocks
 from phigen.geometry.shapes import Affine, Canonical, Constant, LiePoisson, LogCanonical
 from phigen.geometry.system import System
-from phigen.realisations import cayley, constant, exponential, karasev, log_canonical
+from phigen.realisations import cayley, constant, exponential, gauged, karasev, log_canonical, product, pullback
 from phigen.realisations.protocol import BiRealisation
-from phigen.spec.model import BirealisationChoice
+from phigen.spec.model import BirealisationChoice, PullbackForm
 
 KIND = "auto"
 
@@ -28,15 +30,18 @@ def build(system: System, choice: BirealisationChoice) -> BiRealisation:
         case LiePoisson() | Affine():
             found = _of_algebra(system, choice)
         case _:
-            found = karasev.build(system, choice)
+            found = _general(system, choice)
     return replace(found, explanation=f"auto picked {found.kind}, since {found.explanation}")
 
 
 def _of_algebra(system: System, choice: BirealisationChoice) -> BiRealisation:
-    """Exponential in closed form, else Cayley, else the exponential by following paths."""
+    """Exponential in closed form, else block by block, else Cayley, else the exponential by following paths."""
     found = exponential.closed_form(system)
     if found is not None:
         return replace(found, explanation=f"{found.explanation}; {_BETTER}")
+    found = _applicable(_by_blocks, system, choice)
+    if found is not None:
+        return found
     try:
         found = cayley.build(system, choice)
     except SpecError as error:
@@ -45,3 +50,36 @@ def _of_algebra(system: System, choice: BirealisationChoice) -> BiRealisation:
         return replace(followed, explanation=f"{followed.explanation}; no Cayley transform either: {why}")
     why = "the exponential has no closed form that phigen finds, and would have to follow paths numerically"
     return replace(found, explanation=f"{found.explanation}; {why}")
+
+
+def _general(system: System, choice: BirealisationChoice) -> BiRealisation:
+    """Constant in other coordinates, or a closed form in those of the spec or for each block; else Karasev."""
+    for kind in (_gauged, _pulled_back, _by_blocks):
+        found = _applicable(kind, system, choice)
+        if found is not None:
+            return found
+    found = karasev.build(system, choice)
+    return replace(found, explanation=f"no closed form is known for this π: {found.explanation}")
+
+
+def _gauged(system: System, choice: BirealisationChoice) -> BiRealisation:
+    return gauged.build(system, choice)
+
+
+def _pulled_back(system: System, choice: BirealisationChoice) -> BiRealisation | None:
+    return pullback.pulled_back(system, build, choice) if isinstance(system.form, PullbackForm) else None
+
+
+def _by_blocks(system: System, choice: BirealisationChoice) -> BiRealisation | None:
+    if len(blocks(system.coordinates, system.poisson)) < 2:
+        return None
+    return product.assembled(system, product.grouped(system), build, choice)
+
+
+def _applicable(
+    kind: Callable[[System, BirealisationChoice], BiRealisation | None], system: System, choice: BirealisationChoice
+) -> BiRealisation | None:
+    try:
+        return kind(system, choice)
+    except SpecError:
+        return None

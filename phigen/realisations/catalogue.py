@@ -11,8 +11,11 @@ from phigen.realisations import (
     constant,
     custom,
     exponential,
+    gauged,
     karasev,
     log_canonical,
+    product,
+    pullback,
     spray,
 )
 from phigen.realisations.protocol import BiRealisation, Builder
@@ -25,8 +28,11 @@ BUILDERS: dict[str, Builder] = {
         constant,
         canonical_euler,
         log_canonical,
+        gauged,
         exponential,
         cayley,
+        product,
+        pullback,
         karasev,
         spray,
         custom,
@@ -34,7 +40,7 @@ BUILDERS: dict[str, Builder] = {
 }
 
 #: Kinds of the spec format that a later version brings.
-PLANNED = ("group-map", "product", "pullback")
+PLANNED = ("group-map",)
 
 
 def realise(system: System, choice: BirealisationChoice | None = None) -> BiRealisation:
@@ -45,7 +51,7 @@ def realise(system: System, choice: BirealisationChoice | None = None) -> BiReal
     """
     choice = choice or BirealisationChoice()
     try:
-        return _builder(choice.kind)(system, choice)
+        return builder(choice.kind)(system, choice)
     except SpecError as error:
         place = system.locations.get(("birealisation",)) or system.locations.get(("poisson",))
         raise type(error)(
@@ -53,7 +59,8 @@ def realise(system: System, choice: BirealisationChoice | None = None) -> BiReal
         ) from None
 
 
-def _builder(kind: str) -> Builder:
+def builder(kind: str) -> Builder:
+    """The builder of a kind; raises `SpecError` for those that do not exist."""
     found = BUILDERS.get(kind)
     if found is not None:
         return found

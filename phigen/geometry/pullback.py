@@ -1,0 +1,148 @@
+"""Structures in other coordinates y = ψ(x): the inverse of ψ, and π in the coordinates x."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+
+from phigen.errors import Diagnostic, SpecError
+from phigen.geometry.linear import inverse_matrix
+from phigen.geometry.shapes import Matrix, skew
+from phigen.spec.model import PullbackForm
+from phigen.symbolic.expression import (
+    Expression,
+    call,
+    derivatives,
+    power,
+    substitute,
+    symbol,
+    symbols_of,
+    topological,
+    total,
+)
+from phigen.symbolic.tower import Tower
+from phigen.symbolic.verdict import decide_zero
+
+#: Functions with an inverse on the whole domain, and it.
+_INVERSES = {"exp": "log", "log": "exp", "sinh": "asinh", "asinh": "sinh", "atan": "tan", "tanh": "atanh"}
+
+
+@dataclass(frozen=True)
+class Coordinates:
+    """y = ψ(x) (``forward``, in x), x = ψ⁻¹(y) (``backward``, in y), and ∂x_i/∂y_a at y = ψ(x) (``jacobian[i][a]``)."""
+
+    forward: tuple[Expression, ...]
+    backward: tuple[Expression, ...]
+    jacobian: Matrix
+
+
+def change_of_coordinates(form: PullbackForm, coordinates: Sequence[str]) -> Coordinates:
+    """The map of a pull-back and its inverse; raises `SpecError` if none is given or found, or a given one is wrong."""
+    _expect_size(form, coordinates)
+    backward = form.inverse or _inverse(form, coordinates)
+    forward = dict(zip(form.coordinates, form.map, strict=True))
+    again = substitute(backward, forward)
+    statement = decide_zero("inverse", [(c, e - symbol(c)) for c, e in zip(coordinates, again, strict=True)])
+    if not statement.holds:
+        detail = f"{statement.detail}; residual {statement.residual}"
+        raise SpecError([Diagnostic(f"pullback: inverse is not the inverse of map: {detail}")])
+    columns = [derivatives(form.map, c) for c in coordinates]
+    return Coordinates(form.map, backward, inverse_matrix([list(row) for row in zip(*columns, strict=True)]))
+
+
+def pulled_back(form: PullbackForm, coordinates: Sequence[str]) -> Matrix:
+    """π_ij = Σ ∂x_i/∂y_a {y_a, y_b} ∂x_j/∂y_b as a function of x."""
+    from phigen.geometry.forms import poisson_matrix  # forms may be nested
+
+    change = change_of_coordinates(form, coordinates)
+    inner = poisson_matrix(form.of, form.coordinates)
+    foreign = [s for s in symbols_of(*(e for row in inner for e in row)) if s in coordinates]
+    if foreign:
+        raise SpecError(
+            [Diagnostic(f"pullback: the form depends on {foreign[0]}, which is not one of its coordinates")]
+        )
+    forward = dict(zip(form.coordinates, change.forward, strict=True))
+    n = len(coordinates)
+    moved = [substitute(row, forward) for row in inner]
+    upper = {}
+    for i in range(n):
+        for j in range(i + 1, n):
+            a, b = change.jacobian[i], change.jacobian[j]
+            upper[i, j] = _simplified(total(a[k] * moved[k][m] * b[m] for k in range(n) for m in range(n)))
+    return skew(upper, n)
+
+
+def _expect_size(form: PullbackForm, coordinates: Sequence[str]) -> None:
+    if len(form.coordinates) != len(coordinates):
+        message = f"pullback: the map has {len(form.coordinates)} components for {len(coordinates)} coordinates"
+        raise SpecError([Diagnostic(message)])
+
+
+def _inverse(form: PullbackForm, coordinates: Sequence[str]) -> tuple[Expression, ...]:
+    """x(y), one coordinate after the other from an equation in which it is the only unknown."""
+    left = dict(zip(form.coordinates, form.map, strict=True))
+    known: dict[str, Expression] = {}
+    while left:
+        found = _next_solved(left, known, coordinates)
+        if found is None:
+            unknown = [c for c in coordinates if c not in known]
+            raise SpecError(
+                [
+                    Diagnostic(
+                        f"pullback: the map could not be inverted symbolically for {', '.join(unknown)}",
+                        hint="give the other direction too, as inverse: {x1: …}",
+                    )
+                ]
+            )
+        y, x, value = found
+        known[x] = _simplified(value)
+        del left[y]
+    return tuple(known[c] for c in coordinates)
+
+
+def _next_solved(
+    left: Mapping[str, Expression], known: Mapping[str, Expression], coordinates: Sequence[str]
+) -> tuple[str, str, Expression] | None:
+    for y, e in left.items():
+        (now,) = substitute([e], known)
+        unknown = [c for c in coordinates if c not in known and c in symbols_of(now)]
+        if len(unknown) == 1:
+            value = _solved(now, symbol(y), unknown[0])
+            if value is not None:
+                return y, unknown[0], value
+    return None
+
+
+def _solved(e: Expression, value: Expression, x: str) -> Expression | None:
+    """x from e(x) = value: directly where e is linear in x, else one operation after the other."""
+    slope = _simplified(derivatives([e], x)[0])
+    if x not in symbols_of(slope):
+        (rest,) = substitute([e], {x: symbol(x) * 0})
+        return (value - rest) / slope
+    inside = [a for a in e.args if x in symbols_of(a)]
+    if len(inside) != 1:
+        return None
+    argument = inside[0]
+    others = [a for a in e.args if a is not argument]
+    match e.op:
+        case "add":
+            return _solved(argument, value - others[0], x)
+        case "sub":
+            moved = value + others[0] if e.args[0] is argument else others[0] - value
+            return _solved(argument, moved, x)
+        case "neg":
+            return _solved(argument, -value, x)
+        case "mul":
+            return _solved(argument, value / others[0], x)
+        case "pow" if e.value == -1 or (e.value.numerator == 1 and e.value > 0):
+            return _solved(argument, power(value, 1 / Fraction(e.value)), x)
+        case op if op in _INVERSES:
+            return _solved(argument, call(_INVERSES[op], value), x)
+    return None
+
+
+def _simplified(e: Expression) -> Expression:
+    """Through the ring, where that leaves fewer operations."""
+    tower = Tower(symbols_of(e), [e])
+    return min(tower.expression(tower.convert(e)), e, key=lambda f: sum(1 for node in topological([f]) if node.args))

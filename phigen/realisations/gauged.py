@@ -1,0 +1,158 @@
+"""π_ij = g_i(x_i) A_ij g_j(x_j): constant π, pulled back along x_i = flow of the vector field g_i.
+
+In y_i = ∫ dx_i/g_i(x_i) the tensor is A and the covector g_i(x_i)p_i, so that with u_i = Σ_j A_ij g_j(x_j)p_j
+
+    α_i = x_i moved along ẋ = g_i(x) for the time −½u_i,    β_i for the time ½u_i.
+
+The flow is elementary, and written without cancellation, for these g:
+
+- ax² + bx + c: x + g(x) T/(1 − T(ax + b/2)) with T = tanh(wt)/w, w² = b²/4 − ac; tan where that is negative, and
+  T = t/(1 − sφ(s)), s = −4w²t², φ as in `phigen.symbolic.special`, where parameters decide the sign
+- bx + c: x + g(x)(e^{bt} − 1)/b, which is the log-canonical realisation for c = 0
+- c e^{kx}: x − log(1 − kt g(x))/k
+- c x^r: x(1 + (1 − r)t g(x)/x)^{1/(1−r)}
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+from fractions import Fraction
+
+from phigen.geometry.separated import separated
+from phigen.geometry.shapes import coordinate_terms
+from phigen.geometry.system import System, hamiltonian_vector_field
+from phigen.realisations.protocol import PAPER, BiRealisation, covector_symbols, is_symmetric, refuse
+from phigen.spec.model import BirealisationChoice
+from phigen.symbolic.expression import ONE, ZERO, Expression, call, derivative, number, power, sqrt, symbol, symbols_of
+from phigen.symbolic.tower import Tower
+
+KIND = "gauged"
+
+_HALF = number(Fraction(1, 2))
+
+
+@dataclass(frozen=True)
+class _Motion:
+    """α − x, β − x, and β − α without cancellation, of one coordinate."""
+
+    early: Expression
+    late: Expression
+    increment: Expression
+
+
+def build(system: System, choice: BirealisationChoice) -> BiRealisation:
+    """The bi-realisation of π_ij = g_i A_ij g_j, symmetric.
+
+    Raises `SpecError` if π is not of this form, or the flow of a g_i is none of those above.
+    """
+    found = separated(system.coordinates, system.poisson)
+    if found is None:
+        raise refuse(
+            f"birealisation {KIND} needs π_ij = g_i(x_i) A_ij g_j(x_j) with constant A; this π is {system.shape}"
+        )
+    p = covector_symbols(system.coordinates)
+    times = hamiltonian_vector_field(found.matrix, [g * pi for g, pi in zip(found.factors, p, strict=True)])
+    motions = []
+    for c, g, u in zip(system.coordinates, found.factors, times, strict=True):
+        motion = _motion(c, g, u, system.positive)
+        if motion is None:
+            raise refuse(f"birealisation {KIND}: phigen has no formula for the flow of {c}' = {g}", "try karasev")
+        motions.append(motion)
+    x = [symbol(c) for c in system.coordinates]
+    alpha = tuple(xi + m.early for xi, m in zip(x, motions, strict=True))
+    beta = tuple(xi + m.late for xi, m in zip(x, motions, strict=True))
+    factors = ", ".join(f"{c}: {g}" for c, g in zip(system.coordinates, found.factors, strict=True) if g is not ONE)
+    return BiRealisation(
+        KIND,
+        system.coordinates,
+        alpha,
+        beta,
+        tuple(m.early for m in motions),
+        tuple(m.increment for m in motions),
+        is_symmetric(alpha, beta, system.coordinates),
+        explanation=f"π is constant in other coordinates, π_ij = g_i A_ij g_j with the factors {factors or '1'}: the "
+        "midpoint chart pulled back along the flows of the factors; symmetric",
+        reference=f"{PAPER}, the quadratic example, for any factors",
+    )
+
+
+def _motion(c: str, g: Expression, u: Expression, positive: Collection[str]) -> _Motion | None:
+    """The motion along g for the times −½u and ½u."""
+    if u.is_zero:
+        return _Motion(ZERO, ZERO, ZERO)
+    terms = coordinate_terms([c], [g])
+    if terms is not None and max(exponent for (exponent,) in terms[0]) <= 2:
+        a, b, constant = (terms[0].get((k,), ZERO) for k in (2, 1, 0))
+        if a.is_zero and b.is_number and not b.is_zero:
+            return _exponential(g, u, b)
+        return _quadratic(symbol(c), g, u, (a, b, constant), positive)
+    rate = _constant(derivative(g, c) / g, c)
+    if rate is not None:
+        early, late = (-call("log", 1 + sign * _HALF * rate * u * g) / rate for sign in (1, -1))
+        return _Motion(early, late, late - early)
+    degree = _constant(symbol(c) * derivative(g, c) / g, c)
+    if degree is not None and degree.is_number and degree.value != 1:
+        return _monomial(symbol(c), g, u, degree.value)
+    return None
+
+
+def _exponential(g: Expression, u: Expression, rate: Expression) -> _Motion:
+    exponent = _HALF * rate * u
+    early, late = (g * (call("exp", e) - 1) / rate for e in (-exponent, exponent))
+    return _Motion(early, late, 2 * g * call("sinh", exponent) / rate)
+
+
+def _quadratic(
+    x: Expression,
+    g: Expression,
+    u: Expression,
+    coefficients: tuple[Expression, Expression, Expression],
+    positive: Collection[str],
+) -> _Motion:
+    a, b, c = coefficients
+    squared = _simplified((b**2 - 4 * a * c) / 4)  # w²
+    tilt = a * x + b / 2
+    if not (squared.is_number or _is_positive(squared, positive)):
+        s = -(squared * u**2)
+        spread = 1 - s * call("phi0", s)
+        slope = _HALF * u * tilt
+        early, late = -(_HALF * g * u) / (spread + slope), (_HALF * g * u) / (spread - slope)
+        return _Motion(early, late, g * u * spread / ((spread + slope) * (spread - slope)))
+    T = _HALF * u
+    if not squared.is_zero:
+        turns = squared.is_number and squared.value < 0
+        w = sqrt(-squared if turns else squared)
+        T = call("tan" if turns else "tanh", w * T) / w
+    early, late = -(g * T) / (1 + T * tilt), g * T / (1 - T * tilt)
+    return _Motion(early, late, 2 * g * T / (1 - (T * tilt) ** 2))
+
+
+def _is_positive(e: Expression, positive: Collection[str]) -> bool:
+    match e.op:
+        case "number":
+            return bool(e.value > 0)
+        case "symbol":
+            return e.value in positive
+        case "add" | "mul" | "pow":
+            return all(_is_positive(a, positive) for a in e.args)
+    return False
+
+
+def _monomial(x: Expression, g: Expression, u: Expression, degree: Fraction) -> _Motion:
+    rest = 1 - degree
+    ratio = _HALF * number(rest) * u * (g / x)
+    early, late = (x * (power(1 + sign * ratio, 1 / rest) - 1) for sign in (-1, 1))
+    return _Motion(early, late, late - early)
+
+
+def _constant(e: Expression, c: str) -> Expression | None:
+    """The expression without the coordinate, if it does not depend on it."""
+    simple = _simplified(e)
+    return None if c in symbols_of(simple) else simple
+
+
+def _simplified(e: Expression) -> Expression:
+    tower = Tower(symbols_of(e), [e])
+    element = tower.convert(e)
+    return ZERO if tower.is_zero(element) else tower.expression(element)

@@ -1,0 +1,76 @@
+"""Block-diagonal π: the bi-realisations of the blocks side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from phigen.geometry.blocks import blocks
+from phigen.geometry.parts import block_of
+from phigen.geometry.shapes import Canonical, Constant
+from phigen.geometry.system import System
+from phigen.realisations.protocol import BiRealisation, Builder, refuse
+from phigen.spec.model import BirealisationChoice
+from phigen.symbolic.expression import ZERO, Expression
+
+KIND = "product"
+
+
+def build(system: System, choice: BirealisationChoice) -> BiRealisation:
+    """The product over the blocks of π, each by the kind ``choice.of`` (default: auto).
+
+    Raises `SpecError` if π has one block only, if a block does not allow the kind, or if the solver of a block
+    would have to follow paths: that is done for the whole system or not at all.
+    """
+    from phigen.realisations.catalogue import builder
+
+    parts = grouped(system)
+    if len(parts) < 2:
+        raise refuse(
+            f"birealisation {KIND} needs a block-diagonal π; here {', '.join(system.coordinates)} are one block"
+        )
+    return assembled(system, parts, builder(choice.of), replace(choice, kind=choice.of, of="auto"))
+
+
+def grouped(system: System) -> list[System]:
+    """The systems of the blocks, those with constant π as one."""
+    single = [block_of(system, indices) for indices in blocks(system.coordinates, system.poisson)]
+    constant = [b for b in single if isinstance(b.shape, Constant | Canonical)]
+    if len(constant) < 2:
+        return single
+    together = {c for b in constant for c in b.coordinates}
+    merged = block_of(system, [i for i, c in enumerate(system.coordinates) if c in together])
+    return [merged, *(b for b in single if b not in constant)]
+
+
+def assembled(
+    system: System, parts: Sequence[System], build_part: Builder, choice: BirealisationChoice
+) -> BiRealisation:
+    """The product of the bi-realisations that ``build_part`` makes of the parts."""
+    found = [build_part(part, choice) for part in parts]
+    for part, realisation in zip(parts, found, strict=True):
+        if realisation.path:
+            names = ", ".join(part.coordinates)
+            raise refuse(f"birealisation {KIND}: no closed form is known for the block ({names})", "try karasev")
+
+    def joined(name: str) -> tuple[Expression, ...]:
+        values = {c: e for r in found for c, e in zip(r.coordinates, getattr(r, name), strict=True)}
+        return tuple(values.get(c, ZERO) for c in system.coordinates)
+
+    listed = [f"({', '.join(r.coordinates)}): {r.kind}, {_short(r.explanation)}" for r in found]
+    return BiRealisation(
+        KIND,
+        system.coordinates,
+        joined("alpha"),
+        joined("beta"),
+        joined("displacement"),
+        joined("increment"),
+        symmetric=all(r.symmetric for r in found),
+        exact=all(r.exact for r in found),
+        explanation=f"π is block diagonal, block by block: {'; '.join(listed)}",
+        reference="; ".join(dict.fromkeys(r.reference for r in found)),
+    )
+
+
+def _short(explanation: str) -> str:
+    return explanation.removeprefix("auto picked ").partition("since ")[2] or explanation

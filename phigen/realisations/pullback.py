@@ -1,0 +1,73 @@
+"""A structure in other coordinates y = ψ(x): α = ψ⁻¹ ∘ α_y ∘ T*ψ⁻¹.
+
+With q_a = Σ_i p_i ∂x_i/∂y_a, the covector in the coordinates y, α(x, p) = ψ⁻¹(α_y(ψ(x), q)), and β likewise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from phigen.geometry.parts import part
+from phigen.geometry.pullback import Coordinates, change_of_coordinates
+from phigen.geometry.system import System
+from phigen.realisations.protocol import (
+    BiRealisation,
+    Builder,
+    covector_names,
+    covector_symbols,
+    is_symmetric,
+    refuse,
+    simplified_differences,
+)
+from phigen.spec.model import BirealisationChoice, PullbackForm
+from phigen.symbolic.expression import Expression, substitute, symbol, total
+
+KIND = "pullback"
+
+
+def build(system: System, choice: BirealisationChoice) -> BiRealisation:
+    """The bi-realisation of the inner structure, by the kind ``choice.of`` (default: auto), in the spec's coordinates.
+
+    Raises `SpecError` unless the form of π is a pull-back, and if the solver of the inner structure would have
+    to follow paths.
+    """
+    from phigen.realisations.catalogue import builder
+
+    return pulled_back(system, builder(choice.of), replace(choice, kind=choice.of, of="auto"))
+
+
+def pulled_back(system: System, build_inner: Builder, choice: BirealisationChoice) -> BiRealisation:
+    """The pull-back of the bi-realisation that ``build_inner`` makes."""
+    form = system.form
+    if not isinstance(form, PullbackForm):
+        raise refuse(f"birealisation {KIND} needs poisson: {{pullback: …}}")
+    change = change_of_coordinates(form, system.coordinates)
+    inner = build_inner(part(system, form.coordinates, form.of), choice)
+    if inner.path or not inner.exact:
+        raise refuse(f"birealisation {KIND}: no closed form is known in the coordinates of the map", "try karasev")
+    alpha, beta = (_moved(system, form, change, maps) for maps in (inner.alpha, inner.beta))
+    x = [symbol(c) for c in system.coordinates]
+    return BiRealisation(
+        KIND,
+        system.coordinates,
+        alpha,
+        beta,
+        simplified_differences(alpha, x),
+        simplified_differences(beta, alpha),
+        is_symmetric(alpha, beta, system.coordinates),
+        explanation=f"π is given in the coordinates {', '.join(form.coordinates)}, and there {inner.explanation}",
+        reference=inner.reference,
+    )
+
+
+def _moved(
+    system: System, form: PullbackForm, change: Coordinates, maps: Sequence[Expression]
+) -> tuple[Expression, ...]:
+    """ψ⁻¹ ∘ map ∘ T*ψ⁻¹."""
+    p = covector_symbols(system.coordinates)
+    covector = [total(pi * row[a] for pi, row in zip(p, change.jacobian, strict=True)) for a in range(len(p))]
+    inside = dict(zip(form.coordinates, change.forward, strict=True))
+    inside |= dict(zip(covector_names(form.coordinates), covector, strict=True))
+    images = substitute(maps, inside)
+    return tuple(substitute(change.backward, dict(zip(form.coordinates, images, strict=True))))
