@@ -31,7 +31,7 @@ class Syntax:
 def statements(program: Program, path: Path, syntax: Syntax) -> dict[str, list[str]]:
     """Statements by purpose: ``fixed`` values, ``first`` coefficients, ``rules`` for order k, ``slopes``.
 
-    ``nodes`` assigns the values of all series at one point to e[i] (no semicolon), ``field`` lists those of ṁ.
+    ``nodes`` set e[i], the values of the derived series at one point, and ``field`` that of ṁ; no semicolons.
     """
     show = syntax.printer(_scope(program, path, syntax, "s[{i}][0]"))
     show_node = syntax.printer(_scope(program, path, syntax, "e[{i}]"))
@@ -46,7 +46,7 @@ def statements(program: Program, path: Path, syntax: Syntax) -> dict[str, list[s
         "rules": [syntax.following.format(i=i, value=_rule(q, text, syntax.sums)) for i, q in derived],
         "slopes": [syntax.slope.format(i=i, slope=slope) for i, slope in enumerate(path.slopes)],
         "nodes": [f"e[{i}] = {show_node(expand_powers([q.first])[0])}" for i, q in derived],
-        "field": [f"e[{slope}]" for slope in path.slopes],
+        "field": [f"field[{i}] = e[{slope}]" for i, slope in enumerate(path.slopes)],
     }
 
 

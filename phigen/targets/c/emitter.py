@@ -154,7 +154,7 @@ def _body(program: Program) -> str:
         unused = [] if reads_coefficients(program.path) else ["(void)coef;"]
         piece = values | statements(program, program.path, _path_syntax(program)) | {"unused": unused}
         pieces += [_render(f"taylor_{kind}.c", values) for kind in kinds(program.path)]
-        pieces += [_render("piece.c", piece)]
+        pieces += [_render("holds.c", piece), _render("piece.c", piece)]
         pieces += [_render("path.c", values), _render("path_step.c", values)]
     elif program.driver == "newton":
         pieces += [_render("size_relative.c" if program.relative else "size.c", values), _render("newton.c", values)]

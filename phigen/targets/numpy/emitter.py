@@ -60,7 +60,8 @@ def emit(program: Program, command: str) -> dict[str, str]:
     elif program.path:
         path = _values(program) | statements(program, program.path, PATH_SYNTAX)
         pieces += [_function(program, kernels["generate"])]
-        pieces += [render("numpy", f"{part}.py", path) for part in ("piece", "path", "residual", "solve", "path_step")]
+        parts = ("holds", "piece", "path", "residual", "solve", "path_step")
+        pieces += [render("numpy", f"{part}.py", path) for part in parts]
     else:
         pieces += [_function(program, kernels["linearise"]), render("numpy", "solve.py", _values(program))]
         pieces += [render("numpy", "newton.py", _values(program))]

@@ -1,0 +1,222 @@
+"""A step of Karasev's scheme in many digits, with its tangent map: no series of the path, nothing of phigen.scheme.
+
+The path ṁ = π(m)p, its mean and the variational equations are integrated by extrapolation of the explicit midpoint
+rule, the equation p = ∇S_h(mean) is solved by Newton's method, and the tangent map follows by implicit differentiation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from fractions import Fraction
+from functools import cache
+from typing import Any
+
+import mpmath
+from support import compiled, relative_defect, values
+
+from phigen import spec
+from phigen.compiler import Compilation, compile_spec
+from phigen.realisations import karasev
+from phigen.series.hamilton_jacobi import graph_series
+from phigen.spec.model import BirealisationChoice
+from phigen.symbolic.expression import derivatives, gradient, number, symbol, total
+
+PATH_DIGITS = 34
+
+
+@cache
+def by_paths(name: str, order: int | None = None) -> Compilation:
+    """A system of the corpus compiled with the bi-realisation karasev, whatever its spec asks for."""
+    return with_paths(compiled(name).spec, order)
+
+
+def with_paths(given: spec.Spec, order: int | None = None, composition: str = "auto") -> Compilation:
+    """A spec compiled with the bi-realisation karasev."""
+    chosen = replace(given, birealisation=BirealisationChoice("karasev"), composition=composition)
+    return compile_spec(chosen, order=order)
+
+
+def compile_paths(text: str, order: int | None = None, composition: str = "auto") -> Compilation:
+    """The same for a spec given as YAML without its first two keys."""
+    return with_paths(spec.loads(f"phigen: 1\nname: t\n{text}"), order, composition)
+
+
+def flow_at_one(field: Callable[[list[Any]], list[Any]], start: Sequence[Any]) -> list[Any]:
+    """The time-1 flow: extrapolation of the explicit midpoint rule until two columns agree, in 1, 2, 4, … pieces."""
+    pieces, target = 1, mpmath.mpf(10) ** (6 - mpmath.mp.dps)
+    while pieces <= 1024:
+        state, good = list(start), True
+        for _ in range(pieces):
+            extrapolated = _extrapolate(field, state, mpmath.mpf(1) / pieces, target)
+            if extrapolated is None:
+                good = False
+                break
+            state = extrapolated
+        if good:
+            return state
+        pieces *= 2
+    raise ArithmeticError("the path is too long")
+
+
+def _extrapolate(field: Callable[[list[Any]], list[Any]], state: list[Any], big: Any, target: Any) -> list[Any] | None:
+    table: list[list[Any]] = []
+    slope = field(state)
+    for row in range(14):
+        count = 2 * (row + 1)
+        h = big / count
+        before, now = state, [s + h * f for s, f in zip(state, slope, strict=True)]
+        for _ in range(count - 1):
+            before, now = now, [b + 2 * h * f for b, f in zip(before, field(now), strict=True)]
+        new = [now]
+        for k in range(row):
+            ratio = (mpmath.mpf(count) / (2 * (row - k))) ** 2 - 1
+            new.append([a + (a - b) / ratio for a, b in zip(new[k], table[k], strict=True)])
+        table = new
+        if row >= 3:
+            scale = max(abs(v) for v in new[-1])
+            if max(abs(a - b) for a, b in zip(new[-1], new[-2], strict=True)) <= target * scale:
+                return new[-1]
+    return None
+
+
+class PreciseSystem:
+    """π and the vector field of a system, in many digits."""
+
+    def __init__(self, compilation: Compilation, parameters: Mapping[str, float]) -> None:
+        system = compilation.system
+        self.system, self.coordinates, self.n = system, system.coordinates, len(system.coordinates)
+        self.parameters = dict(parameters)
+        n, covector = self.n, [f"p:{c}" for c in self.coordinates]
+        slopes = [total(system.poisson[i][j] * symbol(covector[j]) for j in range(n)) for i in range(n)]
+        columns = [derivatives(slopes, c) for c in self.coordinates]
+        self._covector = covector
+        self._slopes = slopes
+        self._linearised = [*slopes, *(columns[j][i] for i in range(n) for j in range(n)), *_flat(system.poisson)]
+
+    def at(self, x: Sequence[Any], p: Sequence[Any] = ()) -> dict[str, Any]:
+        """Values of all symbols."""
+        pairs = [*zip(self.coordinates, x, strict=True), *(zip(self._covector, p, strict=True) if p else ())]
+        return {**self.parameters, **dict(pairs)}
+
+    def poisson(self, x: Sequence[Any]) -> Any:
+        """The matrix π(x)."""
+        return mpmath.matrix(self.n, self.n) + _square(values(_flat(self.system.poisson), self.at(x)), self.n)
+
+    def path(self, x: Sequence[Any], p: Sequence[Any]) -> tuple[list[Any], list[Any]]:
+        """End and mean of the path."""
+        n = self.n
+
+        def field(state: list[Any]) -> list[Any]:
+            return [*values(self._slopes, self.at(state[:n], list(p))), *state[:n]]
+
+        state = flow_at_one(field, [*x, *[mpmath.mpf(0)] * n])
+        return state[:n], state[n:]
+
+    def varied(self, x: Sequence[Any], p: Sequence[Any]) -> tuple[list[Any], list[Any], Any, Any, Any, Any]:
+        """End m and mean μ of the path, and ∂m/∂x, ∂m/∂p, ∂μ/∂x, ∂μ/∂p."""
+        n = self.n
+
+        def field(state: list[Any]) -> list[Any]:
+            both = values(self._linearised, self.at(state[:n], list(p)))
+            jacobian, pi = _square(both[n : n + n * n], n), _square(both[n + n * n :], n)
+            by_x, by_p = _square(state[2 * n : 2 * n + n * n], n), _square(state[2 * n + n * n : 2 * n + 2 * n * n], n)
+            return [
+                *both[:n],
+                *state[:n],
+                *(jacobian * by_x),
+                *(jacobian * by_p + pi),
+                *state[2 * n : 2 * n + 2 * n * n],
+            ]
+
+        zeros = [mpmath.mpf(0)] * (n * n)
+        state = flow_at_one(field, [*x, *zeros[:n], *mpmath.eye(n), *zeros, *zeros, *zeros])
+        blocks = [_square(state[2 * n + k * n * n : 2 * n + (k + 1) * n * n], n) for k in range(4)]
+        return state[:n], state[n : 2 * n], blocks[0], blocks[1], blocks[2], blocks[3]
+
+
+class PrecisePathStep(PreciseSystem):
+    """One step, of one or several stages: ``step(x)`` gives Φ(x), ``step.solve(x)`` also DΦ(x)."""
+
+    def __init__(self, compilation: Compilation, parameters: Mapping[str, float], h: float) -> None:
+        super().__init__(compilation, parameters)
+        fractions = compilation.program.fractions
+        terms = compilation.order.terms if len(fractions) == 1 else 1
+        system = compilation.system
+        alpha = karasev.series(system, max(terms - 1, 1))
+        series = graph_series(system.hamiltonian, alpha, self.coordinates, terms, symmetric=True)
+        self.parameters["h:stage"] = mpmath.mpf(0)
+        s = total(_power(i + 1) * term for i, term in enumerate(series))
+        slope = gradient(s, self.coordinates)
+        hessian = [d for c in self.coordinates for d in derivatives(slope, c)]  # symmetric: rows or columns
+        self._momenta = [*slope, *hessian]
+        # The solver multiplies h and the fraction in double precision.
+        self.steps = [mpmath.mpf(h) * mpmath.mpf(f) for f in fractions]
+
+    def _generate(self, mean: Sequence[Any]) -> tuple[Any, Any]:
+        found = values(self._momenta, self.at(mean))
+        return mpmath.matrix(found[: self.n]), _square(found[self.n :], self.n)
+
+    def __call__(self, x: Sequence[Any]) -> list[Any]:
+        """Φ(x)."""
+        with mpmath.workdps(PATH_DIGITS):
+            state = [mpmath.mpf(v) for v in x]
+            for h in self.steps:
+                p = self._covector_of(state, h)
+                state = self.path(state, list(p))[0]
+            return state
+
+    def _covector_of(self, x: list[Any], h: Any) -> Any:
+        """The solution p of p = ∇S_h(mean), by a Newton iteration whose matrix is that of the first point."""
+        self.parameters["h:stage"] = h
+        slope, hessian = self._generate(x)
+        inverse = mpmath.inverse(mpmath.eye(self.n) - hessian * self.poisson(x) / 2)
+        p, last = slope, mpmath.inf
+        for _ in range(80):
+            residual = p - self._generate(self.path(x, list(p))[1])[0]
+            size = mpmath.norm(residual, mpmath.inf)
+            if size <= mpmath.mpf(10) ** (8 - PATH_DIGITS) * (mpmath.norm(p, mpmath.inf) + mpmath.eps):
+                return p
+            if size > last / 2:  # slow: the exact matrix
+                by_p = self.varied(x, list(p))[5]
+                inverse = mpmath.inverse(mpmath.eye(self.n) - self._generate(self.path(x, list(p))[1])[1] * by_p)
+            last = size
+            p = p - inverse * residual
+        raise ArithmeticError("no convergence")
+
+    def solve(self, x: Sequence[Any]) -> tuple[list[Any], Any]:
+        """Φ(x) and DΦ(x)."""
+        with mpmath.workdps(PATH_DIGITS):
+            state, tangent = [mpmath.mpf(v) for v in x], mpmath.eye(self.n)
+            for h in self.steps:
+                p = self._covector_of(state, h)
+                end, mean, m_x, m_p, mean_x, mean_p = self.varied(state, list(p))
+                hessian = self._generate(mean)[1]
+                p_x = mpmath.inverse(mpmath.eye(self.n) - hessian * mean_p) * hessian * mean_x
+                state, tangent = end, (m_x + m_p * p_x) * tangent
+            return state, tangent
+
+    def defect(self, x: Sequence[Any]) -> float:
+        """|DΦ π DΦᵀ − π∘Φ| relative to |π∘Φ| at x."""
+        with mpmath.workdps(PATH_DIGITS):
+            image, tangent = self.solve(x)
+            return relative_defect(tangent, self.poisson(x), self.poisson(image))
+
+
+def _power(exponent: int) -> Any:
+    step = symbol("h:stage")
+    result = number(Fraction(1))
+    for _ in range(exponent):
+        result = result * step
+    return result
+
+
+def _flat(matrix: Sequence[Sequence[Any]]) -> list[Any]:
+    return [e for row in matrix for e in row]
+
+
+def _square(entries: Sequence[Any], n: int) -> Any:
+    result = mpmath.matrix(n, n)
+    for k, e in enumerate(entries):
+        result[k // n, k % n] = e
+    return result
