@@ -9,6 +9,7 @@ from math import lcm
 
 from phigen.symbolic.expression import (
     Expression,
+    fold,
     number,
     power,
     product,
@@ -22,6 +23,9 @@ from phigen.symbolic.tower import Poly, Tower, rational
 
 #: Terms of a formula that are shown unless all are asked for.
 SHOWN = 8
+
+#: Functions of phigen's own that have a name in mathematics.
+_GREEK = {"phi0": "φ", "phi1": "φ'", "phi2": "φ''"}
 
 #: Formulas with more nodes than this are not expanded to look for a shorter form.
 _LARGE = 400
@@ -88,7 +92,8 @@ def readable(expressions: Sequence[Expression], most: int | None = SHOWN) -> lis
     """The expressions as text, expanded where that is shorter; covectors are written ``p_NAME``."""
     shown = with_plain_names(expressions)
     expanded = _expanded(shown, most)
-    return [min((str(f), text(e)), key=len) if f else text(e) for f, e in zip(expanded, shown, strict=True)]
+    plain = [_infix(e) if len(topological([e])) <= _LARGE else text(e) for e in shown]
+    return [min((str(f), t), key=len) if f else t for f, t in zip(expanded, plain, strict=True)]
 
 
 def readable_latex(expressions: Sequence[Expression]) -> list[str]:
@@ -97,6 +102,40 @@ def readable_latex(expressions: Sequence[Expression]) -> list[str]:
     expanded = _expanded(shown, None)
     forms = [[latex(e), *([f.latex()] if f else [])] for f, e in zip(expanded, shown, strict=True)]
     return [min(form, key=len) for form in forms]
+
+
+def _infix(e: Expression) -> str:
+    """The expression as text with no more parentheses than mathematics needs, unlike `text`, which keeps the tree."""
+
+    def wrap(part: tuple[str, int], level: int) -> str:
+        return part[0] if part[1] >= level else f"({part[0]})"
+
+    def visit(node: Expression, args: list[tuple[str, int]]) -> tuple[str, int]:
+        match node.op:
+            case "add":
+                right = args[1][0]
+                joint = f" - {right[1:]}" if right.startswith("-") else f" + {right}"
+                return args[0][0] + joint, 1
+            case "sub":
+                return f"{args[0][0]} - {wrap(args[1], 2)}", 1
+            case "neg":
+                return f"-{wrap(args[0], 2)}", 1
+            case "mul" if node.args[0].is_number and node.args[0].value < 0:
+                return f"-{text(-node.args[0])}*{wrap(args[1], 2)}", 1
+            case "mul" if node.args[1].op == "pow" and node.args[1].value == -1:
+                return f"{wrap(args[0], 2)}/{args[1][0].removeprefix('1/')}", 2
+            case "mul":
+                return f"{wrap(args[0], 2)}*{wrap(args[1], 2)}", 2
+            case "pow" if node.value == -1:
+                return f"1/{wrap(args[0], 3)}", 2
+            case "pow" if node.value.denominator == 1 and node.value > 0:
+                return f"{wrap(args[0], 4)}**{node.value}", 3
+            case _ if node.args and node.op not in ("pow", "power"):
+                return f"{_GREEK.get(node.op, node.op)}({', '.join(a for a, _ in args)})", 4
+        written = text(node)
+        return written, 4 if not node.args and written.isidentifier() else 3 if written.isdigit() else 2
+
+    return fold([e], visit)[0][0]
 
 
 def latex(e: Expression) -> str:

@@ -58,7 +58,10 @@ def _print(compilation: Compilation, most: int | None) -> None:
     if system.invariants:
         _section("Invariants", _assignments(_named(system.invariants, most)))
     why = textwrap.wrap(compilation.realisation.explanation, 100)
-    _section(f"Bi-realisation: {compilation.realisation.kind}", [*why, *_assignments(_maps(compilation, most))])
+    maps = _assignments(_maps(compilation, most))
+    if any("φ(" in line for line in maps):
+        maps.append("where φ(s) = (1 − (√s/2) cot(√s/2))/s = 1/12 + s/720 + …")
+    _section(f"Bi-realisation: {compilation.realisation.kind}", [*why, *maps])
     _section(f"Generating function: {method(compilation)}", _assignments(_series(compilation, most)))
     _section("Generated code", _code(compilation))
 
