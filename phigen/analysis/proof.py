@@ -21,6 +21,7 @@ from phigen.symbolic.verdict import REFUTED, Statement, decide_elements
 Groups = Mapping[str, tuple[Statement, ...]]
 
 PREFIX = "bi-realisation: "
+METHOD = "Bi-realisation"
 
 
 @dataclass(frozen=True)
@@ -87,14 +88,16 @@ def compile_proved(spec: Spec, *, order: int | None = None, system: System | Non
 
 def refutation(found: Examination) -> str:
     """What is refuted, for a message, each with its place in the spec."""
-    return "\n".join(_placed(found.spec, s) for s in found.refuted)
-
-
-def _placed(spec: Spec, statement: Statement) -> str:
-    names = {f"{name} is a Casimir": ("casimirs", name) for name in spec.casimirs}
-    names |= {f"{name} is invariant": ("invariants", name) for name in spec.invariants}
-    default = ("birealisation",) if statement.name.startswith(PREFIX) else ("poisson",)
-    return str(spec.diagnostic(names.get(statement.name, default), str(statement)))
+    spec = found.spec
+    places: dict[str, tuple[str, ...]] = {f"{name} is a Casimir": ("casimirs", name) for name in spec.casimirs}
+    places |= {f"{name} is invariant": ("invariants", name) for name in spec.invariants}
+    lines = []
+    for group, statements in found.groups.items():
+        default = ("birealisation",) if group.startswith(METHOD) else ("poisson",)
+        for s in statements:
+            if s.verdict == REFUTED:
+                lines.append(str(spec.diagnostic(places.get(s.name, default), str(s))))
+    return "\n".join(lines)
 
 
 def _geometry(system: System) -> Groups:
@@ -110,7 +113,7 @@ def _method(compilation: Compilation) -> Groups:
     stripped = [
         replace(s, name=s.name.removeprefix(PREFIX)) for s in axioms.check(compilation.system, compilation.realisation)
     ]
-    label = f"Bi-realisation ({compilation.realisation.kind})"
+    label = f"{METHOD} ({compilation.realisation.kind})"
     return {label: tuple(stripped), "Hamilton–Jacobi series": tuple(series_statements(compilation))}
 
 

@@ -172,6 +172,15 @@ def test_what_is_refuted_is_not_built(phigen, write):
     assert "a.yaml:15:17: error: F is invariant: refuted" in done.stderr
 
 
+def test_refuted_birealisation_is_located_at_itself(phigen, write):
+    path = write("a.yaml")
+    half = "  alpha: [q - p_p/3, p + p_q/3]\n  beta: [q + p_p/3, p - p_q/3]\n"
+    path.write_text(path.read_text() + f"birealisation:\n  kind: custom\n{half}")
+    done = phigen("build", path)
+    assert done.exit_code == 5
+    assert "a.yaml:15:1: error: {α_i, α_j} = π_ij∘α: refuted" in done.stderr
+
+
 def test_two_specs_of_one_name_are_an_error(phigen, write):
     write("specs/a.yaml")
     write("specs/b.yaml", name="a")
