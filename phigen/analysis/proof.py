@@ -94,9 +94,8 @@ def refutation(found: Examination) -> str:
     lines = []
     for group, statements in found.groups.items():
         default = ("birealisation",) if group.startswith(METHOD) else ("poisson",)
-        for s in statements:
-            if s.verdict == REFUTED:
-                lines.append(str(spec.diagnostic(places.get(s.name, default), str(s))))
+        refuted = (s for s in statements if s.verdict == REFUTED)
+        lines += [str(spec.diagnostic(places.get(s.name, default), str(s))) for s in refuted]
     return "\n".join(lines)
 
 
