@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 from phigen.scheme.collected import collect
 from phigen.scheme.lowering import cost
@@ -37,6 +38,10 @@ class GeneratingFunction:
 
     def cost(self) -> int:
         """Cost of one evaluation of gradient and Hessian, after staging."""
+        return self._cost
+
+    @cached_property
+    def _cost(self) -> int:
         roots = [*self.slope, *(e for i, row in enumerate(self.hessian) for e in row[i:])]
         return cost(self.coefficients.hoist(roots))
 
