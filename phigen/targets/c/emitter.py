@@ -14,6 +14,12 @@ from phigen.targets.rendering import render
 #: Backward differences kept for the starting guess of the inner solve.
 HISTORY = 8
 
+#: Past values that the fitted recurrence uses, and values that it is fitted to; less where the solver grows too large.
+WINDOW, FITTED, SMALLEST = 16, 80, 30
+
+#: Values that the history of a solver may hold in all.
+MOST_HISTORY = 8_000
+
 #: Most terms of the expansion of a path; a path that needs more is cut into pieces.
 TERMS = 30
 
@@ -63,6 +69,7 @@ def _values(program: Program) -> dict[str, object]:
         "remembered": "p" if program.path else "y - x",
         "coefficients": max(1, program.coefficients),
         "history": HISTORY,
+        **_memory_values(program),
         "coordinates": ", ".join(f"{c} = x[{i}]" for i, c in enumerate(program.coordinates)),
         "casimirs": ", ".join(f"{c} = out[{i}]" for i, c in enumerate(program.casimirs)) or "none",
         "members": [
@@ -76,6 +83,12 @@ def _values(program: Program) -> dict[str, object]:
         "apart": apart(program),
         "pivoting": f"{program.name}_solve" + ("_pivoting" if "eliminate" in program.kernels else ""),
     }
+
+
+def _memory_values(program: Program) -> dict[str, int]:
+    affordable = MOST_HISTORY // (2 * program.dimension * len(program.fractions))
+    fitted = max(SMALLEST, min(FITTED, affordable))
+    return {"fitted": fitted, "kept": 2 * fitted, "window": 2 * (fitted * WINDOW // FITTED // 2)}
 
 
 def _gauge_values(program: Program) -> dict[str, object]:
@@ -148,7 +161,7 @@ def _body(program: Program) -> str:
         pieces += [static("generate" if program.path else "linearise"), _render("pivoting.c", values)]
         if "eliminate" in kernels:
             pieces += [static("eliminate"), _render("unrolled.c", values)]
-        pieces += [_render("remember.c", values)]
+        pieces += [_render("remember.c", values), _render("train.c", values), _render("learn.c", values)]
     pieces.append(_render("advance.c", values))
     if program.path:
         unused = [] if reads_coefficients(program.path) else ["(void)coef;"]
