@@ -12,10 +12,11 @@ from phigen.geometry import checks
 from phigen.geometry.jacobi import jacobi_identity
 from phigen.geometry.system import System, system_from_spec
 from phigen.realisations import axioms
-from phigen.scheme.discretisation import series_of
+from phigen.scheme.discretisation import formal_alpha, series_of
+from phigen.scheme.order import Order
 from phigen.series.hamilton_jacobi import residual
 from phigen.spec.model import Spec
-from phigen.symbolic.verdict import REFUTED, Statement, decide_elements
+from phigen.symbolic.verdict import REFUTED, UNDECIDED, Statement, decide_elements
 
 #: Statements by the part of the mathematics they belong to, in the order of the pipeline.
 Groups = Mapping[str, tuple[Statement, ...]]
@@ -118,19 +119,30 @@ def _method(compilation: Compilation) -> Groups:
 
 def series_statements(compilation: Compilation) -> Iterator[Statement]:
     """S_1 … S_k solve the Hamilton–Jacobi equation; the S_i of even index vanish where the order rests on it."""
-    system, realisation, terms = compilation.system, compilation.realisation, compilation.order.terms
-    further = 1 if realisation.symmetric else 0  # S_{k+1} = 0 is what makes the order k + 1
-    series = series_of(system, realisation, terms + further)
-    rest = residual(series, system.hamiltonian, realisation.alpha, system.coordinates)
+    system, realisation, plan = compilation.system, compilation.realisation, stage_order(compilation)
+    terms = plan.terms + (1 if realisation.symmetric else 0)  # S_{k+1} = 0 is what makes the order k + 1
+    name = f"∂_t S_t = H(α(x, ∇S_t)) for S_t = {sum_of_terms(plan.terms)}"
+    try:
+        series = series_of(system, realisation, terms)
+        alpha = formal_alpha(system, realisation, terms)
+        rest = residual(series, system.hamiltonian, alpha, system.coordinates)
+    except OverflowError:
+        yield Statement(name, UNDECIDED, "too many terms to expand; the recursion itself is used, unexpanded")
+        return
     listed = [(f"coefficient of t^{i}", r) for i, r in enumerate(rest)]
-    name = f"∂_t S_t = H(α(x, ∇S_t)) for S_t = {sum_of_terms(terms)}"
-    yield decide_elements(name, series.tower, listed[:terms], system.positive, f"up to t^{terms - 1}")
+    yield decide_elements(name, series.tower, listed[: plan.terms], system.positive, f"up to t^{plan.terms - 1}")
     if realisation.symmetric:
-        even = ", ".join(f"S_{i}" for i in range(2, terms + further + 1, 2))
+        even = ", ".join(f"S_{i}" for i in range(2, terms + 1, 2))
         found = [entry for i, entry in enumerate(listed) if i % 2]
+        whose = "" if plan is compilation.order else " of each stage"
         yield decide_elements(
-            f"{even} = 0", series.tower, found, system.positive, f"hence the order {compilation.order.order}"
+            f"{even} = 0", series.tower, found, system.positive, f"hence the order {plan.order}{whose}"
         )
+
+
+def stage_order(compilation: Compilation) -> Order:
+    """The order and the terms of one stage: those of the method, unless it is composed of stages of order 2."""
+    return compilation.order if len(compilation.program.fractions) == 1 else Order(2, 1)
 
 
 def sum_of_terms(terms: int) -> str:

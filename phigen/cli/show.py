@@ -79,8 +79,12 @@ def _assignments(pairs: Sequence[tuple[str, str]]) -> list[str]:
 
 def method(compilation: Compilation) -> str:
     """``order 6 from S_1 … S_5, symmetric: the even terms vanish``."""
-    plan = compilation.order
-    terms = "S_1" if plan.terms == 1 else f"S_1 … S_{plan.terms}"
+    from phigen.analysis.proof import stage_order
+
+    plan, stage = compilation.order, stage_order(compilation)
+    terms = "S_1" if stage.terms == 1 else f"S_1 … S_{stage.terms}"
+    if stage is not plan:
+        return f"order {plan.order}, composed of {len(compilation.program.fractions)} stages of order 2 from {terms}"
     why = "symmetric, so the terms of even index vanish" if compilation.realisation.symmetric else "not symmetric"
     note = f" ({plan.note})" if plan.note else ""
     return f"order {plan.order} from {terms}; {why}{note}"
@@ -125,10 +129,11 @@ def series_formulas(compilation: Compilation, most: int | None) -> tuple[list[tu
     The map of step h is the flow of H − h^p S_{p+1} + …, where p is the order and S the untruncated series.
     """
     from phigen.analysis.formulas import of_polynomial
+    from phigen.analysis.proof import stage_order
     from phigen.scheme.discretisation import series_of
 
-    plan = compilation.order
-    more = plan.order <= _MODIFIED_UP_TO
+    plan = stage_order(compilation)
+    more = plan is compilation.order and plan.order <= _MODIFIED_UP_TO
     series = series_of(compilation.system, compilation.realisation, plan.order + 1 if more else plan.terms)
     listed = [(i, of_polynomial(series.tower, s, most)) for i, s in enumerate(series.terms[: plan.terms], 1) if s != 0]
     return listed, of_polynomial(series.tower, -series.terms[plan.order], most) if more else None
@@ -167,6 +172,7 @@ def _files(compilation: Compilation) -> dict[str, str]:
 
 def _described(compilation: Compilation) -> dict[str, object]:
     from phigen.analysis.formulas import readable
+    from phigen.analysis.proof import stage_order
 
     system, realisation, plan = compilation.system, compilation.realisation, compilation.order
     listed, correction = series_formulas(compilation, None)
@@ -189,7 +195,8 @@ def _described(compilation: Compilation) -> dict[str, object]:
             "beta": readable(realisation.beta, None),
         },
         "order": plan.order,
-        "terms": plan.terms,
+        "terms": stage_order(compilation).terms,
+        "stages": list(compilation.program.fractions),
         "series": {f"S_{i}": {"formula": str(f), "terms": f.size} for i, f in listed},
         "modified_hamiltonian": None if correction is None else {"power": plan.order, "coefficient": str(correction)},
         "operations": dict(compilation.program.operations),

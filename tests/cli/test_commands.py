@@ -86,6 +86,23 @@ def test_show_log_canonical_s3_and_modified_hamiltonian(phigen):
     assert second["modified_hamiltonian"]["power"] == 2
 
 
+def test_series_of_a_composition_is_that_of_its_stages(phigen, write):
+    path = write("a.yaml")
+    path.write_text(path.read_text().replace("order: 2", "order: 4\ncomposition: triple-jump"))
+    assert "S_2 = 0 (hence the order 2 of each stage)" in phigen("check", path).stdout
+    assert "order 4, composed of 3 stages of order 2 from S_1" in phigen("show", path).stdout
+    shown = json.loads(phigen("show", path, "--json").stdout)
+    assert (shown["order"], shown["terms"], shown["modified_hamiltonian"]) == (4, 1, None)
+
+
+def test_series_of_a_path_is_proved_beyond_the_formal_degree(phigen, write):
+    path = write("a.yaml")
+    path.write_text(path.read_text().replace("order: 2", "order: 6\nbirealisation: karasev"))
+    done = phigen("check", path)
+    assert done.exit_code == 0
+    assert "S_2, S_4, S_6 = 0" in done.stdout
+
+
 def test_show_abbreviates_unless_full(phigen):
     path = SPECS / "rigid_body.yaml"
     assert " terms)" in phigen("show", path).stdout
