@@ -1,0 +1,110 @@
+"""Every function that a bracket may contain has a recurrence: the step against one in many digits."""
+
+import mpmath
+import numpy as np
+import pytest
+from precise_path import PATH_DIGITS, PrecisePathStep, compile_paths
+from support import TARGETS, RawC, relative_defect, solver
+
+EPS = np.finfo(float).eps
+START, STEP = (1.1, 0.6), 0.1
+
+BRACKETS = [
+    "1/(1 + x**2 + y**2)",
+    "x**3*y",
+    "(x + y)**(3/2)",
+    "(x + y)**(-1/3)",
+    "x**(-2)",
+    "x**y",
+    "(1 + x)**a",
+    "y**2/(x - 3)",
+    "exp(x*y)",
+    "log(x + y)",
+    "sqrt(1 + x*y)",
+    "sin(x)",
+    "cos(x - y)",
+    "tan(x/2)",
+    "asin(x/3)",
+    "acos(y/2)",
+    "atan(x*y)",
+    "atan2(y, x)",
+    "sinh(x)",
+    "cosh(y)",
+    "tanh(x + y)",
+    "asinh(x)",
+    "acosh(1 + x)",
+    "atanh(x/4)",
+    "abs(x - 2)*y",
+    "sin(x)**3 - cos(y)**2",
+    "sqrt(exp(x)/(1 + log(2 + y**2)))",
+    "a*x*y + pi + E",
+    "x*exp(a*y)/(1 + a**2)",
+    "a",
+]
+
+
+def plane(bracket):
+    """A system with {x, y} = bracket and parameter a: Poisson in two dimensions, whatever the bracket."""
+    return f"""coordinates: [x, y]
+parameters: {{a: 0.7}}
+poisson: {{brackets: {{x: {{y: "{bracket}"}}}}}}
+hamiltonian: x + 7*y/10 + x*y/3 + y**2/4
+"""
+
+
+@pytest.mark.parametrize("bracket", BRACKETS)
+def test_path_of_each_function_is_followed_to_roundoff(bracket):
+    compilation = compile_paths(plane(bracket), 2)
+    parameters = {"a": 0.45}
+    step = PrecisePathStep(compilation, parameters, STEP)
+    image, tangent = step.solve(START)
+    with mpmath.workdps(PATH_DIGITS):
+        assert relative_defect(tangent, step.poisson(START), step.poisson(image)) < 1e-25
+    raw = RawC(compilation)
+    raw.init(START, parameters)
+    assert raw.step(STEP) == 0
+    # The covector is rounded, too: a few units of rounding of the longest of x and its change.
+    bound = 6 * EPS * max(1, *(abs(float(v)) for v in image))
+    assert max(abs(a - b) for a, b in zip(raw.exact_state, image, strict=True)) <= bound
+    numpy = solver(compilation, "numpy").step(START, h=STEP, parameters=parameters)
+    assert max(abs(a - b) for a, b in zip(numpy, image, strict=True)) <= bound
+
+
+def test_parameters_of_the_bracket_reach_the_path():
+    solve = {t: solver(compile_paths(plane("a*x*y"), 2), t) for t in TARGETS}
+    for a in (-1.5, 0.0, 2.0):
+        ends = [solve[t].step(START, h=STEP, a=a) for t in TARGETS]
+        step = PrecisePathStep(compile_paths(plane("a*x*y"), 2), {"a": a}, STEP)
+        image = [float(v) for v in step(START)]
+        assert np.max(np.abs(np.array(ends) - image)) < 8 * EPS * max(np.abs(image))
+
+
+@pytest.mark.parametrize("target", TARGETS)
+@pytest.mark.parametrize("power", [4, 6, 8, 9])
+def test_expansion_with_a_gap_is_not_taken_for_a_finished_one(power, target):
+    # From y = 0 on, z(t) = -(4 h t)^(power+1)/(power+1) + …, with nothing before.
+    text = f"""coordinates: [x, y, z]
+poisson: {{brackets: {{x: {{y: 1, z: y**{power}}}}}}}
+hamiltonian: 4*x + y**2/2 + 2*z
+"""
+    compilation, start = compile_paths(text, 2), (0.3, 0.0, 0.2)
+    image = PrecisePathStep(compilation, {}, STEP)(start)
+    found = solver(compilation, target).step(start, h=STEP)
+    assert max(abs(a - b) for a, b in zip(found, image, strict=True)) <= 2 * EPS
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_path_across_a_kink_is_refused(target):
+    from phigen import StepError
+
+    text = """coordinates: [x, y]
+poisson: {brackets: {x: {y: abs(x - 1)}}}
+hamiltonian: y
+"""
+    solve = solver(compile_paths(text, 2), target)
+    assert solve.step((1.5, 0.0), h=-1.0)[0] == pytest.approx(1 + 0.5 * np.exp(-1))
+    text = text.replace("abs(x - 1)", "1 + abs(x - 1)")
+    solve = solver(compile_paths(text, 2), target)
+    assert solve.step((1.5, 0.0), h=1.0)[0] == pytest.approx(1.5 * np.exp(1))
+    with pytest.raises(StepError):
+        solve.step((1.5, 0.0), h=-1.0)
