@@ -19,7 +19,7 @@ KIND = "log-canonical"
 def build(system: System, choice: BirealisationChoice) -> BiRealisation:
     """The bi-realisation of a log-canonical π, symmetric and global; raises `SpecError` for any other π.
 
-    The increment is −2 x_j sinh(½u_j).
+    The increment is −2 x_j sinh(½u_j), without a function that would cancel at small u_j.
     """
     if not isinstance(system.shape, LogCanonical):
         raise refuse(f"birealisation {KIND} needs {{x_i, x_j}} = a_ij x_i x_j; this π is {system.shape}", "try auto")
@@ -31,16 +31,17 @@ def build(system: System, choice: BirealisationChoice) -> BiRealisation:
         half * total(row[j] * w for row, w in zip(a, products, strict=True) if not row[j].is_zero)
         for j in range(len(x))
     ]
-    growth = [call("exp", u) for u in exponents]
-    alpha = tuple(xj * g for xj, g in zip(x, growth, strict=True))
+    # With t = exp(u/2) − 1 everything that the solver needs is rational: 2 sinh(u/2) = t (1 + 1/(1 + t)).
+    growth = [call("expm1", u) for u in exponents]
+    alpha = tuple(xj * call("exp", u) for xj, u in zip(x, exponents, strict=True))
     beta = tuple(xj * call("exp", -u) for xj, u in zip(x, exponents, strict=True))
     return BiRealisation(
         KIND,
         system.coordinates,
         alpha,
         beta,
-        tuple(xj * (g - 1) for xj, g in zip(x, growth, strict=True)),
-        tuple(-2 * (xj * call("sinh", u)) for xj, u in zip(x, exponents, strict=True)),
+        tuple(xj * t for xj, t in zip(x, growth, strict=True)),
+        tuple(-(xj * (t * (1 + 1 / (1 + t)))) for xj, t in zip(x, growth, strict=True)),
         is_symmetric(alpha, beta, system.coordinates),
         explanation="π is log-canonical: α_j = x_j exp(u_j/2), β_j = x_j exp(−u_j/2) with u_j = Σ a_ij x_i p_i; "
         "symmetric and global, signs and zeros of the coordinates are kept",

@@ -43,8 +43,8 @@ def expand_powers(roots: Sequence[Expression]) -> list[Expression]:
 
 def _power(base: Expression, exponent: Fraction) -> Expression:
     if exponent < 0:
-        if exponent.denominator == 1:
-            return raw("pow", (_power(base, -exponent),), Fraction(-1))
+        if exponent.denominator == 1:  # one reciprocal, shared by all negative powers of the base
+            return _integer_power(raw("pow", (base,), Fraction(-1)), -int(exponent))
         # One reciprocal root, then products: r**(-3/2) is (1/sqrt(r))**3.
         root = _root(base, exponent.denominator)
         if root is not None:

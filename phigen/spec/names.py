@@ -9,7 +9,7 @@ from phigen.symbolic.expression import FUNCTIONS
 from phigen.symbolic.special import SPECIAL
 
 #: Functions of expressions with their number of arguments; ``sign``, ``power`` and φ are phigen's own.
-_OWN = ("sign", "power", *SPECIAL)
+_OWN = ("sign", "power", "expm1", *SPECIAL)
 SPEC_FUNCTIONS: dict[str, int] = {"sqrt": 1} | {f: n for f, n in FUNCTIONS.items() if f not in _OWN}
 
 SPEC_NAME = r"[a-z][a-z0-9_]{0,30}"
@@ -67,17 +67,21 @@ BIREALISATIONS = (
     "constant",
     "canonical-euler",
     "log-canonical",
+    "gauged",
     "cayley",
     "exponential",
+    "group-map",
     "karasev",
     "spray",
+    "product",
+    "pullback",
     "custom",
 )
-POISSON_FORMS = ("matrix", "brackets", "canonical", "log_canonical", "lie_algebra", "nambu")
+POISSON_FORMS = ("matrix", "brackets", "canonical", "log_canonical", "lie_algebra", "nambu", "product", "pullback")
 COMPOSITIONS = ("auto", "none", "suzuki", "triple-jump", "kahan-li", "yoshida")
 PLANNED: dict[str, tuple[str, ...]] = {
-    "birealisation": ("group-map", "product", "pullback"),
-    "poisson": ("product", "pullback"),
+    "birealisation": (),
+    "poisson": (),
     "composition": ("blanes-moan",),
     "gauge": (),
     "scheme": (),

@@ -39,6 +39,7 @@ from phigen.symbolic.special import SPECIAL, coefficient, order_of
 #: Functions of an expression, with their number of arguments.
 FUNCTIONS: dict[str, int] = {
     "exp": 1,
+    "expm1": 1,  # exp(a) − 1 without cancellation, of phigen's own, not accepted in a spec
     "log": 1,
     "sin": 1,
     "cos": 1,
@@ -436,6 +437,8 @@ def partials(e: Expression) -> list[Expression]:
             return [e * e.args[1] / a, e * call("log", a)]
         case "exp":
             return [e]
+        case "expm1":
+            return [1 + e]
         case "log":
             return [1 / a]
         case "sin":

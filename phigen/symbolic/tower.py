@@ -180,6 +180,8 @@ class Tower:
             return self._generator(name, [])
         if name == "abs":
             return self.function("sign", args) * args[0]
+        if name == "expm1":
+            return self.function("exp", args) - 1
         first = args[0]
         if name in SPECIAL:
             return self._special(order_of(name), first)

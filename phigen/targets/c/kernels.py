@@ -12,8 +12,8 @@ from phigen.targets.header import plain
 from phigen.targets.names import C_RESERVED, Scope
 from phigen.targets.printer import Printer
 
-_SAME: tuple[str, ...] = ("exp", "log", "sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh")
-_SAME += ("asinh", "acosh", "atanh", "sqrt", "cbrt")
+_SAME: tuple[str, ...] = ("exp", "expm1", "log", "sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sinh", "cosh")
+_SAME += ("tanh", "asinh", "acosh", "atanh", "sqrt", "cbrt")
 FUNCTIONS = {name: name for name in _SAME} | {
     "abs": "fabs",
     "power": "pow",

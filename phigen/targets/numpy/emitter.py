@@ -12,7 +12,7 @@ from phigen.targets import special
 from phigen.targets.code import Code, lower
 from phigen.targets.header import CHECKSUM, checksum, header_lines, plain
 from phigen.targets.names import PYTHON_RESERVED, Scope
-from phigen.targets.path import Syntax, statements
+from phigen.targets.path import Syntax, statements, tangent_program
 from phigen.targets.printer import Printer
 from phigen.targets.rendering import render
 
@@ -30,7 +30,9 @@ FUNCTIONS = {
     "abs": "np.abs",
     "power": "np.power",
     "sign": "np.sign({0})",
-} | {name: f"np.{name}" for name in ["exp", "log", "sin", "cos", "tan", "sinh", "cosh", "tanh", "sqrt", "cbrt"]}
+} | {
+    name: f"np.{name}" for name in ["exp", "expm1", "log", "sin", "cos", "tan", "sinh", "cosh", "tanh", "sqrt", "cbrt"]
+}
 CONSTANTS = {"pi": "np.pi", "E": "np.e"}
 
 
@@ -70,9 +72,27 @@ def emit(program: Program, command: str) -> dict[str, str]:
     pieces += [render("numpy", "api.py", _values(program))]
     pieces += [_function(program, kernels[k]) for k in ("energy", "casimirs", "vector_field")]
     pieces += [render("numpy", "observables.py", _values(program))]
+    if program.extras.tangent:
+        pieces += _tangent(program)
     body = "\n\n".join(p.strip("\n") + "\n" for p in pieces)
     comment = "\n".join(f"# {line}".rstrip() for line in header_lines(program, command))
     return {f"{program.name}.py": f"{comment}\n# {CHECKSUM} {checksum(body)}\n{body}"}
+
+
+def _tangent(program: Program) -> list[str]:
+    """The tangent map of a step, with what it needs."""
+    values, pieces = _values(program), []
+    if program.driver == "explicit":
+        pieces += [_function(program, program.kernels["explicit_tangent"])]
+    elif program.tangent_path:
+        extended = tangent_program(program)
+        path = program.tangent_path
+        values |= statements(extended, path, PATH_SYNTAX)
+        values |= {"series": len(path.series), "n_twice": extended.dimension}
+        pieces += [_function(program, program.kernels["curvature"])]
+        pieces += [render("numpy", f"tangent_{part}.py", values) for part in ("holds", "piece", "seeds")]
+    pieces.append(render("numpy", f"tangent_{program.driver}.py", values))
+    return [*pieces, render("numpy", "tangent.py", values)]
 
 
 def _values(program: Program) -> dict[str, object]:
