@@ -13,22 +13,22 @@ from functools import cache
 from typing import Any
 
 import mpmath
-from support import compiled, relative_defect, values
+from support import RawC, Setting, relative_defect, values
 
-from phigen import spec
+from phigen import resources, spec
 from phigen.compiler import Compilation, compile_spec
 from phigen.realisations import karasev
 from phigen.series.hamilton_jacobi import graph_series
 from phigen.spec.model import BirealisationChoice
 from phigen.symbolic.expression import derivatives, gradient, number, symbol, total
 
-PATH_DIGITS = 34
+PATH_DIGITS = 30
 
 
 @cache
 def by_paths(name: str, order: int | None = None) -> Compilation:
     """A system of the corpus compiled with the bi-realisation karasev, whatever its spec asks for."""
-    return with_paths(compiled(name).spec, order)
+    return with_paths(spec.load(resources.bundled_specs() / f"{name}.yaml"), order)
 
 
 def with_paths(given: spec.Spec, order: int | None = None, composition: str = "auto") -> Compilation:
@@ -40,6 +40,18 @@ def with_paths(given: spec.Spec, order: int | None = None, composition: str = "a
 def compile_paths(text: str, order: int | None = None, composition: str = "auto") -> Compilation:
     """The same for a spec given as YAML without its first two keys."""
     return with_paths(spec.loads(f"phigen: 1\nname: t\n{text}"), order, composition)
+
+
+def numbers(compilation: Compilation, run: str) -> Setting:
+    """State, step size and parameters of a run."""
+    found, parameters = compilation.spec.runs[run], {p.name: float(p.value) for p in compilation.spec.parameters}
+    parameters |= {k: float(v) for k, v in found.parameters.items()}
+    return Setting(tuple(float(v) for v in found.initial), float(found.step), parameters)
+
+
+def state_of(raw: RawC) -> list[Any]:
+    """The state of a C solver with what its compensated sum carries."""
+    return [mpmath.mpf(float(x)) + mpmath.mpf(float(c)) for x, c in zip(raw.x, raw.carry, strict=True)]
 
 
 def flow_at_one(field: Callable[[list[Any]], list[Any]], start: Sequence[Any]) -> list[Any]:

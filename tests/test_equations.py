@@ -7,7 +7,8 @@ import mpmath
 import numpy as np
 import pytest
 from equations import FIELDS, extrapolated
-from support import compiled, setting, solver, values
+from precise_path import numbers
+from support import compiled, solver, values
 
 from phigen import resources
 
@@ -18,7 +19,7 @@ BUNDLED = {path.stem for path in resources.bundled_specs().glob("*.yaml")}
 @pytest.mark.parametrize("name", sorted(BUNDLED & set(FIELDS)))
 def test_vector_field_is_that_of_the_equations_of_motion(name):
     system = compiled(name).system
-    centre = setting(compiled(name)).x
+    centre = numbers(compiled(name), "reference").x
     draw = np.random.default_rng(1)
     with mpmath.workdps(30):
         for _ in range(3):
@@ -49,7 +50,7 @@ def test_reference_state_is_the_solution_in_many_digits(name):
 def test_run_ends_at_the_reference_state(name):
     compilation, expected = compiled(name), REFERENCES[name]
     run = compilation.spec.runs["reference"]
-    at = setting(compilation, run)
+    at = numbers(compilation, "reference")
     trajectory = solver(compilation, "c").integrate(at.x, h=at.h, steps=int(run.steps), stride=int(run.steps))
     error = np.max(np.abs(trajectory.x[-1] - np.array([float(v) for v in expected["state"]])))
     assert error <= expected["tolerance"]

@@ -3,7 +3,7 @@
 import mpmath
 import numpy as np
 import pytest
-from precise_path import PATH_DIGITS, PrecisePathStep, compile_paths
+from precise_path import PATH_DIGITS, PrecisePathStep, compile_paths, state_of
 from support import TARGETS, RawC, relative_defect, solver
 
 EPS = np.finfo(float).eps
@@ -65,7 +65,7 @@ def test_path_of_each_function_is_followed_to_roundoff(bracket):
     assert raw.step(STEP) == 0
     # The covector is rounded, too: a few units of rounding of the longest of x and its change.
     bound = 6 * EPS * max(1, *(abs(float(v)) for v in image))
-    assert max(abs(a - b) for a, b in zip(raw.exact_state, image, strict=True)) <= bound
+    assert max(abs(a - b) for a, b in zip(state_of(raw), image, strict=True)) <= bound
     numpy = solver(compilation, "numpy").step(START, h=STEP, parameters=parameters)
     assert max(abs(a - b) for a, b in zip(numpy, image, strict=True)) <= bound
 
