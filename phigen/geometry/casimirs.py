@@ -12,14 +12,15 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from fractions import Fraction
 
 from phigen.geometry.field import Field, Scalar
+from phigen.geometry.forms import structure
 from phigen.geometry.linear import coprime_integers, kernel
 from phigen.geometry.polynomial_casimirs import polynomial_casimirs
 from phigen.geometry.rank import generic_ranks
 from phigen.geometry.representations import known_representation
 from phigen.geometry.shapes import Canonical, Constant, LiePoisson, LogCanonical, Matrix, Shape
 from phigen.geometry.trace_casimirs import trace_casimirs
-from phigen.spec.model import NambuForm, PoissonForm
-from phigen.symbolic.expression import Expression, call, gradient, number, power, product, symbol, total
+from phigen.spec.model import NambuForm, PoissonForm, ProductForm, PullbackForm
+from phigen.symbolic.expression import Expression, call, gradient, number, power, product, substitute, symbol, total
 
 #: Largest degree of the polynomials that are searched for.
 DEGREE = 4
@@ -66,6 +67,13 @@ def _candidates(
     if isinstance(form, NambuForm):
         yield from form.casimirs
         return
+    if isinstance(form, ProductForm):
+        for names, inner in form.blocks:
+            yield from _candidates(names, *structure(inner, names), inner, [])
+    if isinstance(form, PullbackForm):
+        forward = dict(zip(form.coordinates, form.map, strict=True))
+        for casimir in _candidates(form.coordinates, *structure(form.of, form.coordinates), form.of, []):
+            yield substitute([casimir], forward)[0]
     match shape:
         case Constant(matrix) | Canonical(matrix=matrix):
             yield from _linear(coordinates, matrix)

@@ -11,6 +11,7 @@ from phigen.geometry.linear import inverse_matrix
 from phigen.geometry.shapes import Matrix, skew
 from phigen.spec.model import PullbackForm
 from phigen.symbolic.expression import (
+    ZERO,
     Expression,
     call,
     derivatives,
@@ -81,6 +82,9 @@ def _expect_size(form: PullbackForm, coordinates: Sequence[str]) -> None:
 
 def _inverse(form: PullbackForm, coordinates: Sequence[str]) -> tuple[Expression, ...]:
     """x(y), one coordinate after the other from an equation in which it is the only unknown."""
+    of_affine = _of_affine_map(form, coordinates)
+    if of_affine is not None:
+        return of_affine
     left = dict(zip(form.coordinates, form.map, strict=True))
     known: dict[str, Expression] = {}
     while left:
@@ -101,6 +105,20 @@ def _inverse(form: PullbackForm, coordinates: Sequence[str]) -> tuple[Expression
     return tuple(known[c] for c in coordinates)
 
 
+def _of_affine_map(form: PullbackForm, coordinates: Sequence[str]) -> tuple[Expression, ...] | None:
+    """x = J⁻¹(y − ψ(0)) where the Jacobian matrix J of ψ is constant; None where it is not."""
+    columns = [[_simplified(e) for e in derivatives(form.map, c)] for c in coordinates]
+    if any(s in coordinates for s in symbols_of(*(e for column in columns for e in column))):
+        return None
+    origin = substitute(form.map, dict.fromkeys(coordinates, ZERO))
+    shifted = [symbol(y) - e for y, e in zip(form.coordinates, origin, strict=True)]
+    try:
+        rows = inverse_matrix([list(row) for row in zip(*columns, strict=True)])
+    except ZeroDivisionError:
+        raise SpecError([Diagnostic("pullback: the map is not invertible, its Jacobian matrix is singular")]) from None
+    return tuple(total(v * s for v, s in zip(row, shifted, strict=True)) for row in rows)
+
+
 def _next_solved(
     left: Mapping[str, Expression], known: Mapping[str, Expression], coordinates: Sequence[str]
 ) -> tuple[str, str, Expression] | None:
@@ -118,7 +136,7 @@ def _solved(e: Expression, value: Expression, x: str) -> Expression | None:
     """x from e(x) = value: directly where e is linear in x, else one operation after the other."""
     slope = _simplified(derivatives([e], x)[0])
     if x not in symbols_of(slope):
-        (rest,) = substitute([e], {x: symbol(x) * 0})
+        (rest,) = substitute([e], {x: ZERO})
         return (value - rest) / slope
     inside = [a for a in e.args if x in symbols_of(a)]
     if len(inside) != 1:

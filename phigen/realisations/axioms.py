@@ -10,11 +10,13 @@ With {F, G} = Σ_i ∂F/∂x_i ∂G/∂p_i − ∂F/∂p_i ∂G/∂x_i on (x, p)
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from fractions import Fraction
 
 from phigen.geometry.system import System
 from phigen.realisations import truncated
 from phigen.realisations.protocol import BiRealisation, covector_names
+from phigen.realisations.pullback import is_composed
 from phigen.symbolic.expression import ZERO, Expression, call, fold, number, rebuild, substitute, symbol, symbols_of
 from phigen.symbolic.tower import Poly, Tower
 from phigen.symbolic.verdict import Statement, decide_elements, decide_zero
@@ -23,15 +25,23 @@ from phigen.symbolic.verdict import Statement, decide_elements, decide_zero
 def check(system: System, realisation: BiRealisation) -> list[Statement]:
     """Statements on the unit, the three families of brackets, and the simplified forms used by the solver.
 
-    Of a truncation (``exact`` False), and of the formal series of a path, the brackets are stated, and proved, up
-    to its degree less one.
+    Of a pull-back the brackets are proved in the other coordinates. Of a truncation (``exact`` False), and of the
+    formal series of a path, the brackets are stated, and proved, up to its degree less one.
     """
+    if realisation.inner is not None and is_composed(system, realisation):
+        return [_unit(system, realisation), *_inner(realisation.inner), _simplified_forms(system, realisation)]
     degree = None if realisation.exact and not realisation.path else realisation.degree
     return [
         _unit(system, realisation),
         *(_brackets(system, realisation) if degree is None else truncated.brackets(system, realisation, degree)),
         _simplified_forms(system, realisation),
     ]
+
+
+def _inner(inner: tuple[System, BiRealisation]) -> list[Statement]:
+    """The brackets of what is pulled back, said to be in its coordinates."""
+    where = f"in the coordinates {', '.join(inner[0].coordinates)}"
+    return [replace(s, detail=f"{s.detail}, {where}" if s.detail else where) for s in check(*inner)[1:4]]
 
 
 def _unit(system: System, realisation: BiRealisation) -> Statement:

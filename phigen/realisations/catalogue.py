@@ -12,6 +12,7 @@ from phigen.realisations import (
     custom,
     exponential,
     gauged,
+    group_map,
     karasev,
     log_canonical,
     product,
@@ -31,6 +32,7 @@ BUILDERS: dict[str, Builder] = {
         gauged,
         exponential,
         cayley,
+        group_map,
         product,
         pullback,
         karasev,
@@ -40,7 +42,7 @@ BUILDERS: dict[str, Builder] = {
 }
 
 #: Kinds of the spec format that a later version brings.
-PLANNED = ("group-map",)
+PLANNED: tuple[str, ...] = ()
 
 
 def realise(system: System, choice: BirealisationChoice | None = None) -> BiRealisation:

@@ -31,6 +31,7 @@ class BiRealisation:
     - ``degree``: of a truncation: α and β are right up to this degree in p, their brackets up to one less
     - ``path``: the solver follows the path ṁ = π(m)p itself (Karasev's construction); ``alpha`` and ``beta``
       are then the formal series, truncated, from which the S_i are computed, and never evaluated
+    - ``inner``: of a pull-back: the structure in the other coordinates and its bi-realisation, on which proofs are done
     - ``explanation``: what it is and why it was chosen, for the user; ``reference``: where it comes from
     """
 
@@ -44,6 +45,7 @@ class BiRealisation:
     exact: bool = True
     path: bool = False
     degree: int | None = None
+    inner: tuple[System, BiRealisation] | None = None
     explanation: str = ""
     reference: str = PAPER
 

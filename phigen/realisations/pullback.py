@@ -10,6 +10,7 @@ from dataclasses import replace
 
 from phigen.geometry.parts import part
 from phigen.geometry.pullback import Coordinates, change_of_coordinates
+from phigen.geometry.pullback import pulled_back as matrix_of_pullback
 from phigen.geometry.system import System
 from phigen.realisations.protocol import (
     BiRealisation,
@@ -43,10 +44,11 @@ def pulled_back(system: System, build_inner: Builder, choice: BirealisationChoic
     if not isinstance(form, PullbackForm):
         raise refuse(f"birealisation {KIND} needs poisson: {{pullback: …}}")
     change = change_of_coordinates(form, system.coordinates)
-    inner = build_inner(part(system, form.coordinates, form.of), choice)
+    structure = part(system, form.coordinates, form.of)
+    inner = build_inner(structure, choice)
     if inner.path or not inner.exact:
         raise refuse(f"birealisation {KIND}: no closed form is known in the coordinates of the map", "try karasev")
-    alpha, beta = (_moved(system, form, change, maps) for maps in (inner.alpha, inner.beta))
+    alpha, beta = (moved(system, form, change, maps) for maps in (inner.alpha, inner.beta))
     x = [symbol(c) for c in system.coordinates]
     return BiRealisation(
         KIND,
@@ -56,12 +58,28 @@ def pulled_back(system: System, build_inner: Builder, choice: BirealisationChoic
         simplified_differences(alpha, x),
         simplified_differences(beta, alpha),
         is_symmetric(alpha, beta, system.coordinates),
+        inner=(structure, inner),
         explanation=f"π is given in the coordinates {', '.join(form.coordinates)}, and there {inner.explanation}",
         reference=inner.reference,
     )
 
 
-def _moved(
+def is_composed(system: System, realisation: BiRealisation) -> bool:
+    """Whether α and β are those of ``realisation.inner`` in the coordinates of the map, for which ψ⁻¹ was proved.
+
+    The axioms then hold if those of the inner realisation do, since T*ψ is symplectic.
+    """
+    if realisation.inner is None or not isinstance(system.form, PullbackForm):
+        return False
+    change = change_of_coordinates(system.form, system.coordinates)
+    structure, inner = realisation.inner
+    if structure.form is not system.form.of or system.poisson != matrix_of_pullback(system.form, system.coordinates):
+        return False
+    pairs = ((realisation.alpha, inner.alpha), (realisation.beta, inner.beta))
+    return all(outer == moved(system, system.form, change, maps) for outer, maps in pairs)
+
+
+def moved(
     system: System, form: PullbackForm, change: Coordinates, maps: Sequence[Expression]
 ) -> tuple[Expression, ...]:
     """ψ⁻¹ ∘ map ∘ T*ψ⁻¹."""

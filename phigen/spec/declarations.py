@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from graphlib import CycleError, TopologicalSorter
 from typing import Any
@@ -18,7 +18,7 @@ from phigen.spec.model import Parameter
 from phigen.spec.names import ARGUMENTS, SPEC_FUNCTIONS
 from phigen.spec.problems import did_you_mean, shown
 from phigen.spec.yaml_source import Node, Scalar
-from phigen.symbolic.expression import Expression, symbol
+from phigen.symbolic.expression import Expression, symbol, symbols_of
 
 Raw = Mapping[str, Any]
 NOTHING = Scope({})
@@ -39,13 +39,15 @@ class Declarations:
     varying: set[str] = field(default_factory=set)  # definitions that depend on coordinates
     incomplete: bool = False
     nodes: dict[str, Scalar] = field(default_factory=dict)  # where each name is declared
+    within: tuple[Any, ...] = ("poisson",)  # the path of keys to the Poisson structure that is being read
+    refused: dict[str, tuple[str, str]] = field(default_factory=dict)  # names that mean nothing there: message, hint
 
     # --- scopes
 
     def scope(self, extra: Mapping[str, Expression] | None = None) -> Scope:
         """Everything declared: for functions on phase space."""
         names = {n: symbol(n) for n in (*self.coordinates, *self.parameters)}
-        return Scope(names | self.definitions | dict(extra or {}), open=self.incomplete)
+        return Scope(names | self.definitions | dict(extra or {}), self.refused, open=self.incomplete)
 
     def constants(self, what: str, extra: Mapping[str, Expression] | None = None) -> Scope:
         """Parameters and what depends on them alone; ``what`` says for what in the message about others."""
@@ -53,12 +55,24 @@ class Declarations:
         names |= {n: e for n, e in self.definitions.items() if n not in self.varying}
         refused = {n: (f"{what} must not depend on the coordinate {n!r}", "") for n in self.coordinates}
         refused |= {n: (f"{what} must not depend on coordinates, as {n!r} does", "") for n in self.varying}
-        return Scope(names | dict(extra or {}), refused, open=self.incomplete)
+        return Scope(names | dict(extra or {}), refused | self.refused, open=self.incomplete)
 
     def numbers(self) -> Scope:
         """No declared name at all: for defaults and initial values."""
         declared = (*self.coordinates, *self.parameters, *self.definitions)
         return Scope({}, {n: (f"expected a number; {n!r} stands for something that varies", "") for n in declared})
+
+    def inside(self, within: tuple[Any, ...], coordinates: tuple[str, ...], message: str) -> Declarations:
+        """What can be used in a structure that has other coordinates; ``message`` begins the refusal of others."""
+        lost = [c for c in self.coordinates if c not in coordinates]
+        gone = {n for n, e in self.definitions.items() if any(s in lost for s in symbols_of(e))}
+        return replace(
+            self,
+            within=within,
+            coordinates=coordinates,
+            definitions={n: e for n, e in self.definitions.items() if n not in gone},
+            refused=self.refused | {n: (f"{message} {n!r}", "") for n in [*lost, *sorted(gone)]},
+        )
 
     # --- values
 

@@ -24,7 +24,6 @@ from phigen.spec.names import (
     FAMILY_HELP,
     IDENTIFIER,
     PLANNED,
-    POISSON_FORMS,
     SPEC_NAME,
 )
 from phigen.spec.yaml_source import Mapping, Scalar, Sequence
@@ -76,20 +75,43 @@ _FORMS: dict[str, tuple[Kind, str]] = {
     "lie_algebra": (LIE_ALGEBRA, "the Lie–Poisson structure {x_i, x_j} = ± Σ c_ij^k x_k"),
     "nambu": (ListOf(FORMULA), "n-2 Casimirs C_k of {f, g} = det ∂(f, g, C_1, …)/∂(x_1, …, x_n)"),
 }
-POISSON = Record(
-    "poisson",
-    tuple(Field(form, *_FORMS[form]) for form in POISSON_FORMS),
-    one=POISSON_FORMS,
-    exactly=True,
-    planned=PLANNED["poisson"],
-)
+
+
+def _structure(what: str, nested: int, *more: Field) -> Record:
+    """A Poisson structure in one of its forms; products and pull-backs hold others, ``nested`` levels deep."""
+    forms = [Field(form, *described) for form, described in _FORMS.items()]
+    if nested:
+        names = ListOf(NAME, least=1)
+        block = _structure(
+            "a block of a product", nested - 1, Field("coordinates", names, "those of the block", required=True)
+        )
+        pullback = Record(
+            "pullback",
+            (
+                Field("of", _structure("of", nested - 1), "a form in the coordinates that map defines", required=True),
+                Field("map", MapOf(NAME, FORMULA, least=1), "these coordinates, by name, as functions", required=True),
+                Field("inverse", FORMULAS, "the coordinates of the spec as functions of them, if phigen cannot tell"),
+            ),
+        )
+        forms.append(Field("product", ListOf(block, least=2), "blocks side by side, without brackets between them"))
+        forms.append(Field("pullback", pullback, "a structure in other coordinates"))
+    keys = tuple(f.key for f in forms)
+    return Record(what, (*more, *forms), one=keys, exactly=True, planned=PLANNED["poisson"])
+
+
+#: How deep products and pull-backs may be nested.
+NESTED = 2
+POISSON = _structure("poisson", NESTED)
 KIND = Choice(BIREALISATIONS, PLANNED["birealisation"])
+TAU = Either({Scalar: FORMULA, Sequence: MATRIX})
 SPRAY = Either({Scalar: Choice(("auto", "flat", "natural")), Sequence: ListOf(FORMULA, least=1)})
 BIREALISATION = Record(
     "birealisation",
     (
         Field("kind", KIND, "auto picks by the shape of π", required=True),
         Field("side", Choice(("q", "p")), "which half canonical-euler takes implicitly", default="q"),
+        Field("of", KIND, "product, pullback: the kind for the blocks, for what is pulled back", default="auto"),
+        Field("tau", TAU, "group-map: a rational function of P = Σ p_i E_i, or a matrix with entries in p_NAME"),
         Field("alpha", ListOf(FORMULA, least=1), "custom: α(x, p), one expression per coordinate, momenta are p_NAME"),
         Field("beta", ListOf(FORMULA, least=1), "custom: β(x, p), one expression per coordinate, momenta are p_NAME"),
         Field("spray", SPRAY, "spray: the quadratic forms f_j of ṗ_j, or the name of a spray", default="auto"),

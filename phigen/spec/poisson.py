@@ -20,8 +20,10 @@ from phigen.spec.model import (
     MatrixForm,
     NambuForm,
     PoissonForm,
+    ProductForm,
+    PullbackForm,
 )
-from phigen.spec.names import FAMILIES, FAMILY_HELP, FAMILY_NAME, MEMBERS
+from phigen.spec.names import FAMILIES, FAMILY_HELP, FAMILY_NAME, MEMBERS, SPEC_FUNCTIONS
 from phigen.spec.problems import counted, did_you_mean, shown
 from phigen.spec.yaml_source import Scalar
 from phigen.symbolic.expression import ZERO, Expression, neg
@@ -32,13 +34,14 @@ Pairs = dict[tuple[int, int], tuple[Scalar, Expression]]
 
 def poisson_form(given: Mapping[str, Any], declared: Declarations) -> PoissonForm | None:
     """The form of ``poisson:``, or ``None`` after errors."""
-    for form, value in given.items():
-        return _FORMS[form](value, declared)
+    for form, read in _FORMS.items():
+        if form in given:
+            return read(given[form], declared)
     return None
 
 
 def _fail(declared: Declarations, path: tuple[Any, ...], message: str, hint: str = "") -> None:
-    declared.reader.problems.add(message, declared.reader.locations["poisson", *path], hint)
+    declared.reader.problems.add(message, declared.reader.locations[*declared.within, *path], hint)
 
 
 def _entries(
@@ -199,6 +202,59 @@ def _nambu(given: list[Scalar | None], declared: Declarations) -> PoissonForm | 
     return NambuForm(tuple(c for c in casimirs if c is not None))
 
 
+def _product(given: list[Mapping[str, Any] | None], declared: Declarations) -> PoissonForm | None:
+    seen: dict[str, Scalar] = {}
+    blocks: list[tuple[tuple[str, ...], PoissonForm | None]] = []
+    for i, block in enumerate(given):
+        nodes = [node for node in (block or {}).get("coordinates", ()) if node is not None]
+        for node in nodes:
+            if declared.coordinate(node) is not None and node.text in seen:
+                declared.reader.error(node, f"product: {node.text!r} is in two blocks")
+            seen[node.text] = node
+        names = tuple(node.text for node in nodes)
+        message = "brackets in a block of a product depend on its own coordinates only, not on"
+        inner = declared.inside((*declared.within, "product", i), names, message)
+        blocks.append((names, poisson_form(block or {}, inner)))
+    missing = [c for c in declared.coordinates if c not in seen]
+    if missing and not declared.incomplete:
+        return _fail(declared, ("product",), f"product: {missing[0]!r} is in no block", "every coordinate is in one")
+    complete = tuple((names, form) for names, form in blocks if form is not None)
+    return ProductForm(complete) if len(complete) == len(blocks) else None
+
+
+def _pullback(given: Mapping[str, Any], declared: Declarations) -> PoissonForm | None:
+    image, other = given.get("map"), given.get("of")
+    if image is None or other is None:
+        return None
+    n = len(declared.coordinates)
+    if len(image) != n and not declared.incomplete:
+        message = f"pullback: map has {counted(len(image), 'component')} for {counted(n, 'coordinate')}"
+        _fail(declared, ("pullback", "map"), message)
+    for name, (key, _) in image.items():
+        if name in declared.nodes or name in declared.coordinates or name in SPEC_FUNCTIONS:
+            declared.reader.error(key, f"pullback: {name!r} has a meaning already", "choose another name")
+    names = tuple(image)
+    forward = [declared.formula(node, declared.scope()) for _, node in image.values()]
+    within = (*declared.within, "pullback", "of")
+    inner = declared.inside(within, names, "this structure is in the coordinates of the map and cannot use")
+    form = poisson_form(other, inner)
+    backward = _inverse(given["inverse"], declared, inner) if "inverse" in given else None
+    if form is None or None in forward:
+        return None
+    return PullbackForm(names, form, tuple(e for e in forward if e is not None), backward)
+
+
+def _inverse(
+    given: Mapping[str, tuple[Scalar, Scalar | None]], declared: Declarations, inner: Declarations
+) -> tuple[Expression, ...] | None:
+    for key, _ in given.values():
+        declared.coordinate(key)
+    missing = [c for c in declared.coordinates if c not in given]
+    if missing and not declared.incomplete:
+        return _fail(declared, ("pullback", "inverse"), f"pullback: inverse does not give {missing[0]!r}")
+    return tuple(inner.formula(given[c][1], inner.scope()) or ZERO for c in declared.coordinates if c in given)
+
+
 _FORMS: dict[str, Callable[[Any, Declarations], PoissonForm | None]] = {
     "matrix": _matrix,
     "brackets": _brackets,
@@ -206,4 +262,6 @@ _FORMS: dict[str, Callable[[Any, Declarations], PoissonForm | None]] = {
     "log_canonical": _log_canonical,
     "lie_algebra": _lie_algebra,
     "nambu": _nambu,
+    "product": _product,
+    "pullback": _pullback,
 }

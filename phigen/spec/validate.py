@@ -20,7 +20,15 @@ from phigen.symbolic.expression import ZERO, Expression, symbol, symbols_of
 
 DEFAULT_ORDER = 4
 #: Options of bi-realisations and the kind that each belongs to.
-OPTIONS = {"alpha": "custom", "beta": "custom", "side": "canonical-euler", "spray": "spray", "degree": "spray"}
+OPTIONS = {
+    "alpha": ("custom",),
+    "beta": ("custom",),
+    "side": ("canonical-euler",),
+    "spray": ("spray",),
+    "degree": ("spray",),
+    "tau": ("group-map",),
+    "of": ("product", "pullback"),
+}
 
 
 def validate(data: bytes, file: str) -> Spec:
@@ -112,15 +120,36 @@ def _license(given: str, declared: Declarations) -> str:
 def _birealisation(given: str | Mapping[str, Any], declared: Declarations) -> BirealisationChoice:
     options = {"kind": given} if isinstance(given, str) else given
     kind = options.get("kind", "")
-    for key, owner in OPTIONS.items():
+    for key, owners in OPTIONS.items():
         location = declared.reader.locations.get(("birealisation", key))
-        if key in options and kind and kind != owner and location is not None:
-            declared.reader.problems.add(f"birealisation: {key} belongs to the kind {owner}, not {kind}", location)
+        if key in options and kind and kind not in owners and location is not None:
+            owner = f"kind{'s' if len(owners) > 1 else ''} {' and '.join(owners)}"
+            declared.reader.problems.add(f"birealisation: {key} belongs to the {owner}, not {kind}", location)
     if kind == "custom":
         return _custom(options, declared)
     if kind == "spray":
         return _spray(options, declared)
-    return BirealisationChoice(kind=kind, side=options.get("side", "q"))
+    if kind == "group-map":
+        return _group_map(options, declared)
+    return BirealisationChoice(kind=kind, side=options.get("side", "q"), of=options.get("of", "auto"))
+
+
+def _group_map(options: Mapping[str, Any], declared: Declarations) -> BirealisationChoice:
+    given = options.get("tau")
+    if given is None:
+        place, hint = declared.reader.locations["birealisation",], "{kind: group-map, tau: (1 + P/2)/(1 - P/2)}"
+        declared.reader.problems.add("birealisation: the kind group-map needs tau", place, hint)
+        return BirealisationChoice(kind="group-map")
+    if isinstance(given, Scalar):
+        scope = declared.constants("tau, a function of the matrix P,", {"P": symbol("P:")})
+        if "P" in declared.nodes:
+            message = "the name 'P' means the matrix Σ p_i E_i in tau"
+            declared.reader.error(declared.nodes["P"], message, "choose another name, or give tau entry by entry")
+        return BirealisationChoice(kind="group-map", tau=declared.formula(given, scope) or ZERO)
+    momenta = _momenta(declared, "tau")
+    scope = declared.constants("tau, a function of the momenta p_NAME,", momenta)
+    rows = tuple(tuple(declared.formula(cell, scope) or ZERO for cell in row or ()) for row in given)
+    return BirealisationChoice(kind="group-map", tau=rows)
 
 
 def _custom(options: Mapping[str, Any], declared: Declarations) -> BirealisationChoice:
@@ -145,11 +174,7 @@ def _on_covectors(
     lists: Mapping[str, Sequence[Scalar | None]], where: str, declared: Declarations
 ) -> dict[str, tuple[Expression, ...]]:
     """Lists of n expressions in the coordinates and ``p_NAME``, by the key of the bi-realisation that holds them."""
-    momenta = {f"p_{c}": symbol(f"p:{c}") for c in declared.coordinates}
-    for name in [c for c in momenta if c in declared.nodes]:
-        message = f"the name {name!r} means the momentum of {name[2:]!r} in {where}"
-        declared.reader.error(declared.nodes[name], message, "choose another name")
-    n, scope, found = len(declared.coordinates), declared.scope(momenta), {}
+    n, scope, found = len(declared.coordinates), declared.scope(_momenta(declared, where)), {}
     for key, nodes in lists.items():
         place = declared.reader.locations.get(("birealisation", key))
         if len(nodes) != n and place is not None and not declared.incomplete:
@@ -160,6 +185,15 @@ def _on_covectors(
 
 
 def _solver(given: Mapping[str, Any], declared: Declarations) -> SolverOptions:
+def _momenta(declared: Declarations, where: str) -> dict[str, Expression]:
+    """The names ``p_NAME``, which must not be those of something else."""
+    momenta = {f"p_{c}": symbol(f"p:{c}") for c in declared.coordinates}
+    for name in [c for c in momenta if c in declared.nodes]:
+        message = f"the name {name!r} means the momentum of {name[2:]!r} in {where}"
+        declared.reader.error(declared.nodes[name], message, "choose another name")
+    return momenta
+
+
     node = given.get("tolerance")
     tolerance: Fraction | None = None
     if node is not None and node.text != "auto":

@@ -46,7 +46,7 @@ def test_what_is_accepted_conforms_to_the_schema(text: str) -> None:
         "poisson: {}",
         "poisson: {nambu: [x1], canonical: {q: [x2], p: [x3]}}",
         "birealisation: caley",
-        "birealisation: group-map",
+        "birealisation: {kind: product, of: caley}",
         "birealisation: {kind: spray, spray: round}",
         "birealisation: {kind: spray, degree: 17}",
         "{order: 1, terms: 1}",

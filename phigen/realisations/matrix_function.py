@@ -1,0 +1,78 @@
+"""Rational functions of one matrix: (1 + P/2)/(1 − P/2) as a matrix of expressions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from phigen.geometry.linear import inverse_matrix
+from phigen.realisations.protocol import refuse
+from phigen.symbolic.expression import ONE, ZERO, Expression, add, fold, rebuild, sub, total
+
+Matrix = list[list[Expression]]
+
+
+def identity(size: int) -> Matrix:
+    """The identity matrix."""
+    return [[ONE if r == c else ZERO for c in range(size)] for r in range(size)]
+
+
+def multiplied(a: Matrix, b: Matrix) -> Matrix:
+    """The product of two matrices, zero entries skipped."""
+    columns = list(zip(*b, strict=True))
+    return [[total(u * v for u, v in zip(row, column, strict=True)) for column in columns] for row in a]
+
+
+class MatrixFunction:
+    """Values of expressions at a matrix P; numbers and parameters stand for multiples of the identity.
+
+    All values are functions of P, hence commute, so that a quotient needs no side.
+    """
+
+    def __init__(self, argument: Matrix) -> None:
+        self._argument, self._size = argument, len(argument)
+
+    def value(self, e: Expression, name: str) -> Matrix:
+        """The matrix e(P), P the symbol ``name``; raises `SpecError` for functions that are not rational in P."""
+        return fold([e], lambda node, args: self._visit(node, args, name))[0]
+
+    def _visit(self, node: Expression, args: Sequence[Matrix], name: str) -> Matrix:
+        if node.op == "symbol" and node.value == name:
+            return self._argument
+        if all(self._is_scalar(a) for a in args) and node.op not in ("add", "sub", "neg", "mul"):
+            return self._scaled(rebuild(node, [a[0][0] for a in args]))
+        match node.op:
+            case "add":
+                return _entrywise(add, args[0], args[1])
+            case "sub":
+                return _entrywise(sub, args[0], args[1])
+            case "neg":
+                return [[-v for v in row] for row in args[0]]
+            case "mul":
+                return multiplied(args[0], args[1])
+            case "pow" if node.value.denominator == 1:
+                return self._power(args[0], int(node.value))
+        raise refuse(
+            f"birealisation group-map: tau uses {node.op} of a matrix; it must be a rational function of P",
+            "kind: exponential is τ = exp(P); other functions are given entry by entry",
+        )
+
+    def _power(self, base: Matrix, n: int) -> Matrix:
+        if n < 0:
+            try:
+                base, n = [list(row) for row in inverse_matrix(base)], -n
+            except ZeroDivisionError:
+                raise refuse("birealisation group-map: tau divides by a matrix that is singular for all p") from None
+        result = base
+        for _ in range(n - 1):
+            result = multiplied(result, base)
+        return result
+
+    def _scaled(self, e: Expression) -> Matrix:
+        return [[e if r == c else ZERO for c in range(self._size)] for r in range(self._size)]
+
+    def _is_scalar(self, m: Matrix) -> bool:
+        return all(v.is_zero if r != c else v is m[0][0] for r, row in enumerate(m) for c, v in enumerate(row))
+
+
+def _entrywise(combine: Callable[[Expression, Expression], Expression], a: Matrix, b: Matrix) -> Matrix:
+    return [[combine(u, v) for u, v in zip(row, other, strict=True)] for row, other in zip(a, b, strict=True)]
