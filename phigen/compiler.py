@@ -21,7 +21,7 @@ from phigen.realisations.protocol import BiRealisation
 from phigen.scheme.assemble import build_program
 from phigen.scheme.order import Order, plan_order
 from phigen.scheme.program import Program
-from phigen.spec.model import Spec
+from phigen.spec.model import Extras, Spec
 
 T = TypeVar("T")
 
@@ -38,8 +38,10 @@ class Compilation:
     seconds: Mapping[str, float] = field(default_factory=dict)
 
 
-def compile_spec(spec: Spec, *, order: int | None = None, system: System | None = None) -> Compilation:
-    """Compile a spec; ``order`` overrides the order (and the terms) that it asks for.
+def compile_spec(
+    spec: Spec, *, order: int | None = None, system: System | None = None, extras: Extras | None = None
+) -> Compilation:
+    """Compile a spec; ``order`` overrides the order (and the terms) that it asks for, ``extras`` its extras.
 
     ``system`` is its system, where the caller has built it already.
     Raises `SpecError` (no bi-realisation applies, …) and `LimitError` (the program would be too large).
@@ -65,6 +67,7 @@ def compile_spec(spec: Spec, *, order: int | None = None, system: System | None 
             composition=spec.composition,
             gauge=spec.gauge,
             solver=spec.solver,
+            extras=extras or spec.extras,
             title=spec.title,
             licence=spec.license,
             spec_sha256=spec.source_sha256,

@@ -15,7 +15,7 @@ from phigen.realisations import axioms
 from phigen.scheme.discretisation import formal_alpha, series_of
 from phigen.scheme.order import Order
 from phigen.series.hamilton_jacobi import residual
-from phigen.spec.model import Spec
+from phigen.spec.model import Extras, Spec
 from phigen.symbolic.verdict import REFUTED, UNDECIDED, Statement, decide_elements
 
 #: Statements by the part of the mathematics they belong to, in the order of the pipeline.
@@ -50,7 +50,9 @@ class Examination:
         return [s for s in self.statements if s.verdict == REFUTED]
 
 
-def examine(spec: Spec, *, order: int | None = None, system: System | None = None) -> Examination:
+def examine(
+    spec: Spec, *, order: int | None = None, system: System | None = None, extras: Extras | None = None
+) -> Examination:
     """Prove what can be proved about a spec, as far along the pipeline as it gets.
 
     Raises `SpecError` if the spec does not even define a system.
@@ -63,7 +65,7 @@ def examine(spec: Spec, *, order: int | None = None, system: System | None = Non
     built = time.perf_counter()
     groups = _geometry(system)
     try:
-        compilation = compile_spec(spec, order=order, system=system)
+        compilation = compile_spec(spec, order=order, system=system, extras=extras)
     except SpecError as error:
         return Examination(spec, groups, obstacle=located(error, spec))
     groups = {**groups, **_method(compilation)}
@@ -73,13 +75,15 @@ def examine(spec: Spec, *, order: int | None = None, system: System | None = Non
     return Examination(spec, groups, compilation, seconds=seconds)
 
 
-def compile_proved(spec: Spec, *, order: int | None = None, system: System | None = None) -> Compilation:
+def compile_proved(
+    spec: Spec, *, order: int | None = None, system: System | None = None, extras: Extras | None = None
+) -> Compilation:
     """`compile_spec`, refusing what is refuted.
 
     Raises `CheckError` that names what is refuted, with the residual: no π that is not Poisson, no claimed Casimir
     that is none, no wrong bi-realisation reaches the output. Raises `SpecError` and `LimitError` as `compile_spec`.
     """
-    found = examine(spec, order=order, system=system)
+    found = examine(spec, order=order, system=system, extras=extras)
     if found.refuted:
         raise CheckError(refutation(found))
     if found.compilation is None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import shlex
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,6 +19,7 @@ from phigen.errors import CheckError
 if TYPE_CHECKING:
     from phigen.cli.outputs import Change
     from phigen.compiler import Compilation
+    from phigen.spec.model import Extras, Spec
 
 DIRECTORY = "generated"
 
@@ -34,6 +35,11 @@ class Options:
     targets: tuple[str, ...] = ()
     order: int | None = None
     single_file: bool = False
+    tangent: bool = False
+
+    def extras_of(self, spec: Spec) -> Extras:
+        """What the code offers beyond the solver: what the spec asks for, and the command line."""
+        return replace(spec.extras, tangent=True) if self.tangent else spec.extras
 
     def targets_of(self, compilation: Compilation) -> tuple[str, ...]:
         """The targets to write: those of the command line, else those of the spec."""
@@ -47,6 +53,7 @@ class Options:
         words += [word for target in self.targets for word in ("-t", target)]
         words += ["--order", str(self.order)] if self.order else []
         words += ["--single-file"] if self.single_file else []
+        words += ["--tangent"] if self.tangent else []
         return shlex.join(words)
 
 
@@ -58,6 +65,7 @@ class Options:
 )
 @click.option("--order", type=ORDER, help="Order of the method, instead of the spec's.")
 @click.option("--single-file", is_flag=True, help="C in one file, NAME.c, without a header.")
+@click.option("--tangent", is_flag=True, help="Generate step_tangent, the derivative of a step, too.")
 @click.option("--compile", "compiling", is_flag=True, help="Compile the C too, to DIR/NAME/libNAME.so.")
 @click.option(
     "--check", "checking", is_flag=True, help="Write nothing; fail if a file differs from what belongs there."
@@ -73,6 +81,7 @@ def command(
     targets: tuple[str, ...],
     order: int | None,
     single_file: bool,
+    tangent: bool,
     compiling: bool,
     checking: bool,
     diff: bool,
@@ -85,7 +94,7 @@ def command(
     """
     if (checking or diff) and compiling:
         raise click.UsageError("--compile writes a library; --check and --diff write nothing")
-    options = Options(Path(output), tuple(dict.fromkeys(targets)), order, single_file)
+    options = Options(Path(output), tuple(dict.fromkeys(targets)), order, single_file, tangent)
     compilations = _compile_all(console, spec_files, options)
     planned = _plan(console, compilations, options)
     if checking or diff:
@@ -103,7 +112,7 @@ def _compile_all(console: Console, spec_files: Sequence[str], options: Options) 
     for spec in load_all(spec_files, collector):
         start = time.perf_counter()
         with collector.collecting():
-            compilations.append(compile_proved(spec, order=options.order))
+            compilations.append(compile_proved(spec, order=options.order, extras=options.extras_of(spec)))
             stages = ", ".join(f"{stage} {seconds:.2f}" for stage, seconds in compilations[-1].seconds.items())
             console.detail(f"{spec.name}: {time.perf_counter() - start:.2f} s ({stages})")
     collector.finish()
@@ -138,6 +147,7 @@ def generate(compilation: Compilation, target: str, options: Options) -> dict[st
     words += ["-t", target] if target not in spec.targets else []
     words += ["--order", str(options.order)] if options.order not in (None, spec.order) else []
     words += ["--single-file"] if single else []
+    words += ["--tangent"] if options.tangent and not spec.extras.tangent else []
     return emit(compilation.program, target, " ".join(words), single_file=single)
 
 

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from phigen.runtime import cache
-from phigen.runtime.interface import BackendError, Floats, Interface, Progress, row_steps
+from phigen.runtime.interface import BackendError, Floats, Interface, MissingExtraError, Progress, row_steps
 
 #: Names of NAME_status, by value, without the prefix.
 STATUSES = ("OK", "NO_CONVERGENCE", "SINGULAR", "NOT_FINITE", "BAD_ARGUMENT")
@@ -39,6 +39,10 @@ _SIGNATURES = {
 }
 
 
+# What is there only if it was asked for.
+_EXTRAS = {"step_tangent": (_INT, (_POINTER, _DOUBLE, _POINTER))}
+
+
 class CSolver:
     """The back end over a shared library; it holds no state, so that threads may share it."""
 
@@ -47,7 +51,8 @@ class CSolver:
     def __init__(self, library: ctypes.CDLL, interface: Interface) -> None:
         self.interface = interface
         self._c: Any = SimpleNamespace()
-        for name, (result, arguments) in _SIGNATURES.items():
+        offered = {name: s for name, s in _EXTRAS.items() if hasattr(library, f"{interface.name}_{name}")}
+        for name, (result, arguments) in {**_SIGNATURES, **offered}.items():
             function = getattr(library, f"{interface.name}_{name}")
             function.restype, function.argtypes = result, arguments
             setattr(self._c, name, function)
@@ -100,6 +105,17 @@ class CSolver:
             first = int(status[failed[0]]) if failed else overall
             raise BackendError(_status(first), -1, final, failed)
         return final
+
+    def step_tangent(self, x: Floats, h: float, parameters: Mapping[str, float]) -> tuple[Floats, Floats]:
+        """See `phigen.runtime.interface.Backend`."""
+        if not hasattr(self._c, "step_tangent"):
+            raise MissingExtraError("step_tangent")
+        solver, state = self._initialised(x, parameters)
+        tangent = np.empty((len(x), len(x)))
+        status = self._c.step_tangent(solver, h, tangent.ctypes.data)
+        if status:
+            raise BackendError(_status(status), 0, x.reshape(1, -1))
+        return state.copy(), tangent
 
     def hamiltonian(self, x: Floats, parameters: Mapping[str, float]) -> Floats:
         """See `phigen.runtime.interface.Backend`."""

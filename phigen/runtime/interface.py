@@ -44,6 +44,10 @@ class BackendError(Exception):
         self.status, self.step, self.states, self.members = status, step, states, members
 
 
+class MissingExtraError(Exception):
+    """The generated code was built without the function that was asked for."""
+
+
 class Backend(Protocol):
     """A loaded solver.
 
@@ -61,6 +65,10 @@ class Backend(Protocol):
 
     def ensemble(self, x0: Floats, h: float, steps: int, parameters: Mapping[str, float]) -> Floats:
         """Final states (members, DIM) of initial states (members, DIM)."""
+        ...
+
+    def step_tangent(self, x: Floats, h: float, parameters: Mapping[str, float]) -> tuple[Floats, Floats]:
+        """The state (DIM,) after one step from ``x`` (DIM,), and its derivative (DIM, DIM)."""
         ...
 
     def hamiltonian(self, x: Floats, parameters: Mapping[str, float]) -> Floats:

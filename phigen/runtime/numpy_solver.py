@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from phigen.runtime.interface import BackendError, Floats, Interface, Progress, row_steps
+from phigen.runtime.interface import BackendError, Floats, Interface, MissingExtraError, Progress, row_steps
 
 _REPORTS = 100
 
@@ -71,6 +71,16 @@ class NumpySolver:
             members = tuple(int(m) for m in error.members)
             raise BackendError(str(error.status), int(error.step), states[-1], members) from error
         return np.asarray(rows[-1], dtype=np.float64)
+
+    def step_tangent(self, x: Floats, h: float, parameters: Mapping[str, float]) -> tuple[Floats, Floats]:
+        """See `phigen.runtime.interface.Backend`."""
+        if not hasattr(self._module, "step_tangent"):
+            raise MissingExtraError("step_tangent")
+        try:
+            following, tangent = self._module.step_tangent(x, h, **parameters)
+        except self._module.StepError as error:
+            raise BackendError(str(error.status), 0, x[np.newaxis]) from error
+        return np.asarray(following, dtype=np.float64), np.asarray(tangent, dtype=np.float64)
 
     def hamiltonian(self, x: Floats, parameters: Mapping[str, float]) -> Floats:
         """See `phigen.runtime.interface.Backend`."""

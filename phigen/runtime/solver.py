@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from phigen.errors import StepError
-from phigen.runtime.interface import Backend, BackendError, Floats, Interface, Progress, row_steps
+from phigen.runtime.interface import Backend, BackendError, Floats, Interface, MissingExtraError, Progress, row_steps
 from phigen.runtime.trajectory import Trajectory
 
 _ADVICE = {
@@ -89,6 +89,24 @@ class Solver:
         except BackendError as error:
             raise self._failure(error, h, None) from error
         return np.array(states[-1])
+
+    def step_tangent(
+        self, x: ArrayLike, h: float, *, parameters: Mapping[str, float] | None = None, **more: float
+    ) -> tuple[Floats, Floats]:
+        """The state (DIM,) one step after ``x`` (DIM,), and its derivative (DIM, DIM), row i along the old coordinates.
+
+        The derivative is exact to round-off; a gauge chosen by the solver is held fixed. Raises `StepError`, and
+        `TypeError` if the solver was compiled without ``tangent=True``.
+        """
+        values = self._parameters(parameters, more)
+        start, h = self._state(x, "x"), _step_size(h)
+        try:
+            return self.backend.step_tangent(start, h, values)
+        except MissingExtraError:
+            hint = "compile it with tangent=True, or say tangent: true in the spec"
+            raise TypeError(f"{self.interface.name} was compiled without step_tangent; {hint}") from None
+        except BackendError as error:
+            raise self._failure(error, h, None) from error
 
     def ensemble(
         self, X0: ArrayLike, h: float, steps: int, *, parameters: Mapping[str, float] | None = None, **more: float

@@ -16,7 +16,8 @@ from phigen.scheme.lowering import cost, operation_counts
 from phigen.scheme.order import Order
 from phigen.scheme.path import build_path
 from phigen.scheme.program import Kernel, Output, Program
-from phigen.spec.model import SolverOptions
+from phigen.scheme.tangent import tangent_kernels, tangent_path
+from phigen.spec.model import NO_EXTRAS, Extras, SolverOptions
 from phigen.symbolic.expression import Expression
 
 DRIVERS = {
@@ -34,6 +35,7 @@ def build_program(
     composition: str = "auto",
     gauge: str | Mapping[str, Expression] = "none",
     solver: SolverOptions | None = None,
+    extras: Extras = NO_EXTRAS,
     title: str = "",
     licence: str = "0BSD",
     spec_sha256: str = "",
@@ -49,6 +51,9 @@ def build_program(
         kernels = path_kernels(system, generating, coefficients)
     else:
         kernels = step_kernels(system, realisation, generating, coefficients)
+    if extras.tangent:
+        kernels |= tangent_kernels(system, kernels, generating, coefficients)
+    varied = tangent_path(system, coefficients) if path and extras.tangent else None
     driver = "path" if path else "explicit" if "explicit" in kernels else "newton"
     kernels |= observables(system) | gauge_kernels(system, realisation, gauge_of)
     prepare = Kernel(
@@ -80,11 +85,13 @@ def build_program(
         kernels={"prepare": prepare, **kernels},
         path=path,
         gauge=gauge_of.free,
+        extras=extras,
+        tangent_path=varied,
         fractions=scheme.fractions,
         relative=isinstance(system.shape, LogCanonical),
         symmetric=realisation.symmetric,
         max_iterations=solver.max_iterations,
-        tolerance=1e-17 if solver.tolerance is None else float(solver.tolerance),
+        tolerance=1e-18 if solver.tolerance is None else float(solver.tolerance),
         license=licence,
         spec_sha256=spec_sha256,
         facts=tuple(fact for fact in (*facts, scheme.note, order.note) if fact),

@@ -32,7 +32,7 @@ def step_kernels(
             "explicit": Kernel(
                 "explicit",
                 "the increment of one step from the state",
-                {"coef": _slots(coefficients), "state": coordinates},
+                {"coef": coefficients.slots, "state": coordinates},
                 (Output("increment", tuple(values)),),
             )
         }
@@ -53,7 +53,7 @@ def step_kernels(
             "linearise",
             "at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the "
             "increment, all with the momenta p = grad S_h(y)",
-            {"coef": _slots(coefficients), "y": coordinates},
+            {"coef": coefficients.slots, "y": coordinates},
             outputs,
             named,
         )
@@ -91,14 +91,10 @@ def path_kernels(system: System, generating: GeneratingFunction, coefficients: C
     generate = Kernel(
         "generate",
         "p = grad S_h(y), and the Jacobian 1 - Hess S_h(y) pi(y) / 2 of the equation for p, up to O(h^2)",
-        {"coef": _slots(coefficients), "y": system.coordinates},
+        {"coef": coefficients.slots, "y": system.coordinates},
         _outputs(flat, ("slope", "jacobian"), (n, n * n)),
     )
     return {"generate": generate} | _elimination_kernel(n)
-
-
-def _slots(coefficients: Coefficients) -> tuple[str, ...]:
-    return tuple(f"c:{k}" for k in range(len(coefficients.values)))
 
 
 def _outputs(values: Sequence[Expression], names: Sequence[str], sizes: Sequence[int]) -> tuple[Output, ...]:

@@ -64,7 +64,12 @@ def build_path(system: System, coefficients: Coefficients) -> Path:
     """The recurrences of ṁ = π(m)p; values that depend on parameters only go to the table."""
     covector = [symbol(momentum(c)) for c in system.coordinates]
     flow = coefficients.hoist(hamiltonian_vector_field(system.poisson, covector))
-    return _Builder(system.coordinates).path(_chains(flow))
+    return path_of(system.coordinates, flow)
+
+
+def path_of(coordinates: Sequence[str], flow: Sequence[Expression]) -> Path:
+    """The recurrences of ṁ = flow(m, p), where p stays constant along the path."""
+    return _Builder(coordinates).path(_chains(flow))
 
 
 def _chains(roots: Sequence[Expression]) -> list[Expression]:

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 
 from phigen._version import __version__
 from phigen.scheme.path import Path
-from phigen.spec.model import Parameter
+from phigen.spec.model import NO_EXTRAS, Extras, Parameter
 from phigen.symbolic.expression import Expression
 
 
@@ -51,7 +51,8 @@ class Program:
     """A solver, ready to be printed. ``driver`` is ``newton``, ``explicit`` or ``path``.
 
     ``path`` holds the recurrences of a path driver. A step of size h is the composition of one step of each
-    of the ``fractions`` of h. ``gauge`` names the Casimirs whose multiple the solver chooses for each trajectory.
+    of the ``fractions`` of h. ``tangent_path`` is the path with its variation (`phigen.scheme.tangent`), if ``extras``
+    ask for the tangent map. ``gauge`` names the Casimirs whose multiple the solver chooses for each trajectory.
 
     ``relative`` tells that the coordinates are positive or keep their sign (log-canonical π), so that errors
     of the inner solve count relative to each coordinate. ``facts`` are the lines of the header.
@@ -69,6 +70,8 @@ class Program:
     path: Path | None = None
     fractions: tuple[float, ...] = (1.0,)
     gauge: tuple[str, ...] = ()
+    extras: Extras = NO_EXTRAS
+    tangent_path: Path | None = None
     relative: bool = False
     symmetric: bool = True
     max_iterations: int = 20

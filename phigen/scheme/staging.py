@@ -15,6 +15,11 @@ class Coefficients:
         self.values: list[Expression] = []
         self._index: dict[int, int] = {}
 
+    @property
+    def slots(self) -> tuple[str, ...]:
+        """The symbols of all coefficients so far."""
+        return tuple(f"c:{k}" for k in range(len(self.values)))
+
     def hoist(self, roots: Sequence[Expression]) -> list[Expression]:
         """The roots with each largest state-independent part replaced by a coefficient ``c:k``.
 

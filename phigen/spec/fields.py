@@ -193,6 +193,13 @@ SPEC = Record(
         ),
         Field("scheme", _switch("scheme", "auto"), "how the one-step map is arranged", default="auto"),
         Field("solver", SOLVER, "the inner solve of a step"),
+        Field("tangent", Boolean(), "also generate step_tangent, the derivative of a step", default=False),
+        Field(
+            "modified_hamiltonian",
+            Integer(0, limits.CORRECTIONS, limit=True),
+            "also generate the modified Hamiltonian, with so many correction terms",
+            default=0,
+        ),
         Field("targets", ListOf(Choice(("c", "numpy")), least=1), "languages of the generated code"),
         Field("runs", MapOf(RUN_NAME, RUN), "named experiments"),
     ),

@@ -36,6 +36,8 @@ LINE_LENGTH = 500
 TEXT_LENGTH = 20_000
 #: Terms of the generating function, and the order of a method.
 ORDER = 16
+#: Correction terms of the modified Hamiltonian.
+CORRECTIONS = 8
 #: Steps of a run.
 STEPS = 10**12
 #: Errors listed in one run; a file with more is rarely improved by the rest.

@@ -122,6 +122,20 @@ class SolverOptions:
 
 
 @dataclass(frozen=True)
+class Extras:
+    """What the generated code offers beyond the solver: ``tangent`` adds ``step_tangent``, the derivative of a step.
+
+    ``modified_hamiltonian`` adds the function of that name, with so many correction terms; 0 for none.
+    """
+
+    tangent: bool = False
+    modified_hamiltonian: int = 0
+
+
+NO_EXTRAS = Extras()
+
+
+@dataclass(frozen=True)
 class Run:
     """A named experiment."""
 
@@ -155,6 +169,7 @@ class Spec:
     gauge: str | Mapping[str, Expression] = "none"  # or the multiple of each Casimir
     scheme: str = "auto"
     solver: SolverOptions = SolverOptions()
+    extras: Extras = NO_EXTRAS
     targets: tuple[str, ...] = ("c", "numpy")
     runs: Mapping[str, Run] = field(default_factory=dict)
     title: str = ""

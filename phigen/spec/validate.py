@@ -10,7 +10,7 @@ from typing import Any
 from phigen.spec.declarations import Declarations, declare
 from phigen.spec.fields import SPEC
 from phigen.spec.kinds import Reader
-from phigen.spec.model import BirealisationChoice, MatrixForm, SolverOptions, Spec
+from phigen.spec.model import BirealisationChoice, Extras, MatrixForm, SolverOptions, Spec
 from phigen.spec.names import KEYWORDS, LICENSE_REFERENCE, LICENSES, TAKEN
 from phigen.spec.poisson import poisson_form
 from phigen.spec.problems import Problems, counted, did_you_mean, shown
@@ -65,6 +65,7 @@ def _parts(raw: Mapping[str, Any], declared: Declarations) -> dict[str, Any]:
         "scheme": raw.get("scheme", "auto"),
         "solver": _solver(raw.get("solver", {}), declared),
         "targets": without_repetition(raw.get("targets", ("c", "numpy")), ("targets",), declared),
+        "extras": Extras(raw.get("tangent", False), raw.get("modified_hamiltonian", 0)),
         "runs": {n: run(n, r, declared) for n, (_, r) in raw.get("runs", {}).items() if r is not None},
         "title": raw.get("title", ""),
         "description": raw.get("description", ""),
@@ -184,7 +185,6 @@ def _on_covectors(
     return found
 
 
-def _solver(given: Mapping[str, Any], declared: Declarations) -> SolverOptions:
 def _momenta(declared: Declarations, where: str) -> dict[str, Expression]:
     """The names ``p_NAME``, which must not be those of something else."""
     momenta = {f"p_{c}": symbol(f"p:{c}") for c in declared.coordinates}
@@ -194,6 +194,7 @@ def _momenta(declared: Declarations, where: str) -> dict[str, Expression]:
     return momenta
 
 
+def _solver(given: Mapping[str, Any], declared: Declarations) -> SolverOptions:
     node = given.get("tolerance")
     tolerance: Fraction | None = None
     if node is not None and node.text != "auto":

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from phigen.scheme.lowering import expand_powers
 from phigen.scheme.path import Path, Series, Term
 from phigen.scheme.program import Program
+from phigen.scheme.tangent import variation
 from phigen.symbolic.expression import Expression, symbols_of
 from phigen.targets.names import Scope
 from phigen.targets.printer import Printer
@@ -48,6 +49,11 @@ def statements(program: Program, path: Path, syntax: Syntax) -> dict[str, list[s
         "nodes": [f"e[{i}] = {show_node(expand_powers([q.first])[0])}" for i, q in derived],
         "field": [f"field[{i}] = e[{slope}]" for i, slope in enumerate(path.slopes)],
     }
+
+
+def tangent_program(program: Program) -> Program:
+    """The program with the coordinates of its tangent path: the state, then its variation."""
+    return replace(program, coordinates=(*program.coordinates, *map(variation, program.coordinates)))
 
 
 def reads_coefficients(path: Path) -> bool:

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 from phigen.scheme.program import Program
 from phigen.targets import special
+from phigen.targets.c import extras
 from phigen.targets.c.kernels import apart, function, members, printer, wrapped_arguments
 from phigen.targets.header import CHECKSUM, checksum, header_lines, plain
 from phigen.targets.path import Syntax, kinds, reads_coefficients, statements
@@ -62,6 +63,7 @@ def _values(program: Program) -> dict[str, object]:
         "version": program.version,
         "sha256": program.spec_sha256,
         **_gauge_values(program),
+        "extra_declarations": extras.declarations(program),
         "stages": len(program.fractions),
         "fractions": ", ".join(repr(f) for f in program.fractions),
         "terms": TERMS,
@@ -177,6 +179,8 @@ def _body(program: Program) -> str:
     if program.gauge:
         pieces += [static("guide"), static("products"), _render("gauge.c", values)]
         pieces.append(_render("choose_gauge.c", values))
+    if program.extras.tangent:
+        pieces += extras.tangent(program, values, _path_syntax(program))
     pieces += [_render("api.c", values), static("energy"), exported("casimirs"), exported("vector_field")]
     if any(apart(program) in piece for piece in pieces):
         pieces.insert(1, _render("apart.c", values))

@@ -1,0 +1,77 @@
+"""The tangent map of a step, Dx_{n+1}/Dx_n, by implicit differentiation: what the three drivers need for it.
+
+*newton*: α(y, ∇S_h(y)) = x gives Dy = J⁻¹, and x' = x + d(y) gives DΦ = 1 + M J⁻¹ with J and M of
+`phigen.scheme.step`: nothing beyond the kernel ``linearise``. *explicit*: the Jacobian of the increment. *path*: the
+equation p = ∇S_h(μ(x, p)) for p, with μ the mean of the path, gives (1 − Hess S_h μ_p) Dp = Hess S_h μ_x; the end m
+of the path gives DΦ = m_x + m_p Dp. Derivatives of end and mean come from the path of the tangent structure.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from phigen.geometry.system import System, hamiltonian_vector_field
+from phigen.scheme.generating import GeneratingFunction
+from phigen.scheme.path import Path, path_of
+from phigen.scheme.program import Kernel, Output
+from phigen.scheme.staging import Coefficients
+from phigen.series.hamilton_jacobi import momentum
+from phigen.symbolic.expression import Expression, derivatives, symbol, total
+
+
+def variation(name: str) -> str:
+    """The symbol of the variation of a coordinate."""
+    return f"v:{name}"
+
+
+def explicit_jacobian(explicit: Kernel, coordinates: Sequence[str], coefficients: Coefficients) -> Kernel:
+    """The Jacobian (n×n) of the increment of an explicit step."""
+    columns = [derivatives(explicit.roots, c) for c in coordinates]
+    n = len(coordinates)
+    flat = coefficients.hoist([columns[j][i] for i in range(n) for j in range(n)])
+    return Kernel(
+        "explicit_tangent",
+        "the Jacobian of the increment of one step",
+        {"coef": coefficients.slots, "state": tuple(coordinates)},
+        (Output("increment_jacobian", tuple(flat)),),
+    )
+
+
+def curvature(system: System, generating: GeneratingFunction, coefficients: Coefficients) -> Kernel:
+    """∇S_h and Hess S_h at the mean of a path."""
+    n = system.dimension
+    flat = coefficients.hoist([*generating.slope, *(e for row in generating.hessian for e in row)])
+    return Kernel(
+        "curvature",
+        "grad S_h(y) and the Hessian of S_h at y",
+        {"coef": coefficients.slots, "y": system.coordinates},
+        (Output("slope", tuple(flat[:n])), Output("slope_jacobian", tuple(flat[n:]))),
+    )
+
+
+def tangent_kernels(
+    system: System, kernels: Mapping[str, Kernel], generating: GeneratingFunction, coefficients: Coefficients
+) -> dict[str, Kernel]:
+    """What the tangent map needs beyond the kernels of the step."""
+    if "explicit" in kernels:
+        return {"explicit_tangent": explicit_jacobian(kernels["explicit"], system.coordinates, coefficients)}
+    return {"curvature": curvature(system, generating, coefficients)} if "generate" in kernels else {}
+
+
+def tangent_path(system: System, coefficients: Coefficients) -> Path:
+    """The path together with its variation v under variations of its start and of p.
+
+    (m, v) is the path of the tangent Poisson structure under the covector (p, w): v̇ = ∂_m(π(m)p) v + π(m) w.
+    Coordinates are the x, then ``v:x``; w is the momentum of the latter.
+    """
+    coordinates = system.coordinates
+    p = [symbol(momentum(c)) for c in coordinates]
+    w = [symbol(momentum(variation(c))) for c in coordinates]
+    flow = list(hamiltonian_vector_field(system.poisson, p))
+    columns = [derivatives(flow, c) for c in coordinates]
+    forced = hamiltonian_vector_field(system.poisson, w)
+    varied: list[Expression] = [
+        total([*(columns[j][i] * symbol(variation(c)) for j, c in enumerate(coordinates)), forced[i]])
+        for i in range(len(coordinates))
+    ]
+    return path_of([*coordinates, *map(variation, coordinates)], coefficients.hoist([*flow, *varied]))
