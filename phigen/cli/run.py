@@ -80,7 +80,7 @@ def command(
     summaries = summaries_of(compilation, experiment, solver, trajectory, console, compare=failure is None)
     if as_json:
         described = described_run(compilation, experiment, solver, trajectory, summaries)
-        out(json.dumps(_finite(described), indent=2, ensure_ascii=False))
+        out(json.dumps(finite(described), indent=2, ensure_ascii=False))
     else:
         print_summary(compilation, experiment, solver, trajectory, summaries)
     if failure:
@@ -264,10 +264,10 @@ def described_run(
     }
 
 
-def _finite(value: Any) -> Any:
+def finite(value: Any) -> Any:
     """JSON has no NaN and no infinity: null stands for them."""
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     if isinstance(value, dict):
-        return {key: _finite(v) for key, v in value.items()}
-    return [_finite(v) for v in value] if isinstance(value, list | tuple) else value
+        return {key: finite(v) for key, v in value.items()}
+    return [finite(v) for v in value] if isinstance(value, list | tuple) else value

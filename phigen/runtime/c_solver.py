@@ -40,7 +40,10 @@ _SIGNATURES = {
 
 
 # What is there only if it was asked for.
-_EXTRAS = {"step_tangent": (_INT, (_POINTER, _DOUBLE, _POINTER))}
+_EXTRAS = {
+    "step_tangent": (_INT, (_POINTER, _DOUBLE, _POINTER)),
+    "init_gauge": (_INT, (_POINTER, _POINTER, _POINTER, _POINTER)),
+}
 
 
 class CSolver:
@@ -48,14 +51,19 @@ class CSolver:
 
     target = "c"
 
-    def __init__(self, library: ctypes.CDLL, interface: Interface) -> None:
+    def __init__(self, library: ctypes.CDLL, interface: Interface, gauge: Floats | None = None) -> None:
         self.interface = interface
+        self._library, self._gauge = library, gauge
         self._c: Any = SimpleNamespace()
         offered = {name: s for name, s in _EXTRAS.items() if hasattr(library, f"{interface.name}_{name}")}
         for name, (result, arguments) in {**_SIGNATURES, **offered}.items():
             function = getattr(library, f"{interface.name}_{name}")
             function.restype, function.argtypes = result, arguments
             setattr(self._c, name, function)
+
+    def with_gauge(self, gauge: Floats) -> CSolver:
+        """See `phigen.runtime.interface.Backend`."""
+        return CSolver(self._library, self.interface, np.ascontiguousarray(gauge, dtype=np.float64))
 
     @classmethod
     def compile(cls, files: Mapping[str, str], interface: Interface) -> CSolver:
@@ -146,7 +154,11 @@ class CSolver:
         packed, first = self._packed(parameters), np.ascontiguousarray(x0, dtype=np.float64)
         address = ctypes.c_void_p(struct.ctypes.data)
         x = struct[: 8 * self.interface.dimension].view(np.float64)  # keeps the memory alive
-        status = self._c.init(address, packed.ctypes.data, first.ctypes.data)
+        if self._gauge is None:
+            status = self._c.init(address, packed.ctypes.data, first.ctypes.data)
+        else:
+            gauge = self._gauge.ctypes.data
+            status = self._c.init_gauge(address, packed.ctypes.data, first.ctypes.data, gauge)
         if status:
             raise BackendError(_status(status), 0, first.reshape(1, -1))
         return address, x

@@ -57,6 +57,10 @@ class Backend(Protocol):
 
     target: str
 
+    def with_gauge(self, gauge: Floats) -> Backend:
+        """A back end whose trajectories all have the given gauge, one value for each Casimir of the gauge."""
+        ...
+
     def integrate(
         self, x0: Floats, h: float, steps: int, stride: int, parameters: Mapping[str, float], progress: Progress | None
     ) -> Floats:

@@ -31,9 +31,14 @@ class NumpySolver:
 
     target = "numpy"
 
-    def __init__(self, module: ModuleType, interface: Interface) -> None:
+    def __init__(self, module: ModuleType, interface: Interface, gauge: Floats | None = None) -> None:
         self.interface = interface
-        self._module: Any = module
+        self.module: Any = module
+        self._options = {} if gauge is None else {"gauge": gauge}
+
+    def with_gauge(self, gauge: Floats) -> NumpySolver:
+        """See `phigen.runtime.interface.Backend`."""
+        return NumpySolver(self.module, self.interface, gauge)
 
     @classmethod
     def from_source(cls, source: str, interface: Interface) -> NumpySolver:
@@ -65,8 +70,8 @@ class NumpySolver:
         if steps == 0 or len(x0) == 0:
             return x0.copy()
         try:
-            rows = self._module.integrate(x0, h, steps, stride=steps, **parameters)
-        except self._module.StepError as error:
+            rows = self.module.integrate(x0, h, steps, stride=steps, **self._options, **parameters)
+        except self.module.StepError as error:
             states = np.asarray(error.states, dtype=np.float64)
             members = tuple(int(m) for m in error.members)
             raise BackendError(str(error.status), int(error.step), states[-1], members) from error
@@ -74,32 +79,32 @@ class NumpySolver:
 
     def step_tangent(self, x: Floats, h: float, parameters: Mapping[str, float]) -> tuple[Floats, Floats]:
         """See `phigen.runtime.interface.Backend`."""
-        if not hasattr(self._module, "step_tangent"):
+        if not hasattr(self.module, "step_tangent"):
             raise MissingExtraError("step_tangent")
         try:
-            following, tangent = self._module.step_tangent(x, h, **parameters)
-        except self._module.StepError as error:
+            following, tangent = self.module.step_tangent(x, h, **self._options, **parameters)
+        except self.module.StepError as error:
             raise BackendError(str(error.status), 0, x[np.newaxis]) from error
         return np.asarray(following, dtype=np.float64), np.asarray(tangent, dtype=np.float64)
 
     def hamiltonian(self, x: Floats, parameters: Mapping[str, float]) -> Floats:
         """See `phigen.runtime.interface.Backend`."""
-        return np.asarray(self._module.hamiltonian(x, **parameters), dtype=np.float64)
+        return np.asarray(self.module.hamiltonian(x, **parameters), dtype=np.float64)
 
     def casimirs(self, x: Floats, parameters: Mapping[str, float]) -> Floats:
         """See `phigen.runtime.interface.Backend`."""
-        return np.asarray(self._module.casimirs(x, **parameters), dtype=np.float64)
+        return np.asarray(self.module.casimirs(x, **parameters), dtype=np.float64)
 
     def vector_field(self, x: Floats, parameters: Mapping[str, float]) -> Floats:
         """See `phigen.runtime.interface.Backend`."""
-        return np.asarray(self._module.vector_field(x, **parameters), dtype=np.float64)
+        return np.asarray(self.module.vector_field(x, **parameters), dtype=np.float64)
 
     def _rows(self, x0: Floats, h: float, steps: int, stride: int, parameters: Mapping[str, float]) -> Floats:
         if steps == 0:
             return x0[np.newaxis].copy()
         try:
-            rows = self._module.integrate(x0, h, steps, stride=stride, **parameters)
-        except self._module.StepError as error:
+            rows = self.module.integrate(x0, h, steps, stride=stride, **self._options, **parameters)
+        except self.module.StepError as error:
             states = np.asarray(error.states, dtype=np.float64).reshape(-1, self.interface.dimension)
             raise BackendError(
                 str(error.status), int(error.step), _ending_at(states, int(error.step), stride)

@@ -116,7 +116,7 @@ def test_gauge_is_held_fixed(target):
     image, tangent = solver(compilation, target).step_tangent(x, 0.2)
     assert defect(compilation, x, image, tangent, {}) <= 1e-14
     if target == "numpy":
-        module = solver(compilation, target).backend._module
+        module = solver(compilation, target).backend.module
         fixed = module.gauge(x)
         by_differences = differences(lambda y: module.step(y, 0.2, gauge=fixed), x)
         assert np.max(np.abs(tangent - by_differences)) <= 1e-11
@@ -161,7 +161,7 @@ def test_c_failure_leaves_state_and_tangent():
 
 def test_numpy_takes_many_members():
     compilation = with_tangent("rigid_body")
-    module = solver(compilation, "numpy").backend._module
+    module = solver(compilation, "numpy").backend.module
     x = np.random.default_rng(5).normal(size=(2, 4, 3))
     image, tangent = module.step_tangent(x, 0.05)
     assert tangent.shape == (2, 4, 3, 3)

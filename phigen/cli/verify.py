@@ -1,0 +1,119 @@
+"""``phigen verify``: build every target of specs, measure what the solvers promise, and judge it."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Sequence
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from phigen.cli.console import Console, heading, out, pass_console, table, verbosity
+from phigen.cli.failures import Collector
+from phigen.cli.sources import ORDER, load_all, many_specs
+from phigen.errors import CheckError
+
+if TYPE_CHECKING:
+    from phigen.analysis.verification import Check, Verification
+    from phigen.compiler import Compilation
+    from phigen.spec.model import Spec
+
+_NOT_FINITE = {math.inf: "∞", -math.inf: "-∞"}
+
+
+@click.command("verify")
+@many_specs
+@click.option("--run", "name", metavar="NAME", help="Which run of the spec.  [default: the first]")
+@click.option("--order", type=ORDER, help="Order of the method, instead of the spec's.")
+@click.option("--quick", is_flag=True, help="Fewer steps.")
+@click.option("--json", "as_json", is_flag=True, help="For machines: one object per spec.")
+@verbosity
+@pass_console
+def command(
+    console: Console, spec_files: tuple[str, ...], name: str | None, order: int | None, quick: bool, as_json: bool
+) -> None:
+    """Build every target of specs and measure what the solvers promise.
+
+    The observed order, drift of Casimirs and energy (the largest error, and that of the last tenth of the run over
+    that of the first), the Poisson identity with the exact tangent map, reversibility, agreement of the targets, and
+    the largest step that can be made. Classical methods stand beside it. Exit code 5 if something falls short.
+    """
+    from phigen.analysis.proof import compile_proved
+
+    collector, found = Collector(), []
+    for spec in load_all(spec_files, collector):
+        with collector.collecting():
+            extras = with_tangent(spec)
+            verification = verified(compile_proved(spec, order=order, extras=extras), name, quick, console)
+            found.append(verification)
+            if not as_json:
+                print_table(verification)
+            if verification.failures:
+                collector.errors.append(fallen_short(verification))
+    if as_json:
+        out(json.dumps([described(v) for v in found], indent=2, ensure_ascii=False))
+    collector.finish()
+
+
+def with_tangent(spec: Spec) -> Any:
+    """The extras of a spec, and the tangent map."""
+    from dataclasses import replace
+
+    return replace(spec.extras, tangent=True)
+
+
+def verified(compilation: Compilation, name: str | None, quick: bool, console: Console) -> Verification:
+    """The verification of a compilation with its tangent map on a run of its spec."""
+    from phigen.analysis.verification import verify
+    from phigen.api import solver_of
+    from phigen.cli.run import prepared
+
+    spec = compilation.spec
+    experiment = prepared(spec, name)
+    run = experiment.run
+    solvers = {target: solver_of(compilation, target) for target in spec.targets}
+    return verify(
+        compilation, solvers, run.name, experiment.initial, experiment.parameters, float(run.step), run.steps,
+        run.compare or ("rk4",), quick=quick,
+    )  # fmt: skip
+
+
+def fallen_short(verification: Verification) -> CheckError:
+    """The error that names what fell short."""
+    lines = [f"{verification.name}: verification failed", *(f"  {f}" for f in verification.failures)]
+    return CheckError("\n".join(lines))
+
+
+def print_table(v: Verification) -> None:
+    """The checks as a table for people."""
+    out(heading(f"{v.name}, run {v.run}") + f": {v.label}")
+    out(f"  {v.steps} steps of {v.step:.9g}, targets {', '.join(v.targets)}")
+    rows = [["", "phigen", "required", "", *v.compared]]
+    rows += [_row(check, v.compared) for check in v.checks]
+    for line in table(rows, right=[1, *range(4, 4 + len(v.compared))]):
+        out(f"  {line}")
+    out("")
+
+
+def _row(check: Check, compared: Sequence[str]) -> list[str]:
+    verdict = "" if not check.limit else "ok" if check.passed else "FAILED"
+    others = [_shown(check.others[m]) if m in check.others else "" for m in compared]
+    return [check.name, _shown(check.value), check.limit, verdict, *others]
+
+
+def _shown(value: float) -> str:
+    if math.isnan(value):
+        return "–"
+    if not math.isfinite(value):
+        return _NOT_FINITE[value]
+    return f"{value:.2f}" if 0.01 <= abs(value) < 1000 else f"{value:.1e}" if value else "0"
+
+
+def described(v: Verification) -> dict[str, Any]:
+    """The verification as plain data; null stands for what is not finite."""
+    from phigen.cli.run import finite
+
+    data: dict[str, Any] = finite(asdict(v))
+    return {**data, "passed": not v.failures, "failures": v.failures}
