@@ -19,8 +19,11 @@ from phigen.geometry.system import System, system_from_spec
 from phigen.realisations.catalogue import realise
 from phigen.realisations.protocol import BiRealisation
 from phigen.scheme.assemble import build_program
+from phigen.scheme.discretisation import series_of
+from phigen.scheme.gauge import Gauge, choose
 from phigen.scheme.order import Order, plan_order
 from phigen.scheme.program import Program
+from phigen.series.hamilton_jacobi import PolynomialSeries
 from phigen.spec.model import Extras, Spec
 
 T = TypeVar("T")
@@ -35,7 +38,17 @@ class Compilation:
     realisation: BiRealisation
     order: Order
     program: Program
+    gauge: Gauge = field(default_factory=Gauge)
     seconds: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def discretised(self) -> System:
+        """The system with the Hamiltonian that is discretised: H less the Casimirs of the gauge."""
+        return self.gauge.applied(self.system)
+
+    def series(self, terms: int) -> PolynomialSeries:
+        """S_1 … S_terms of `discretised`; the symbol ``gauge:C`` is the multiple of C that the solver chooses."""
+        return series_of(self.discretised, self.realisation, terms, self.gauge.symbols)
 
 
 def compile_spec(
@@ -58,6 +71,7 @@ def compile_spec(
     choice = replace(spec.birealisation, order=order) if order else spec.birealisation
     realisation = timed("bi-realisation", lambda: realise(source, choice))
     plan = plan_order(order or spec.order, None if order else spec.terms, symmetric=realisation.symmetric)
+    gauge = timed("gauge", lambda: choose(source, realisation, spec.gauge))
     program = timed(
         "program",
         lambda: build_program(
@@ -65,7 +79,7 @@ def compile_spec(
             realisation,
             plan,
             composition=spec.composition,
-            gauge=spec.gauge,
+            gauge=gauge,
             solver=spec.solver,
             extras=extras or spec.extras,
             title=spec.title,
@@ -73,7 +87,7 @@ def compile_spec(
             spec_sha256=spec.source_sha256,
         ),
     )
-    return Compilation(spec, source, realisation, plan, program, seconds)
+    return Compilation(spec, source, realisation, plan, program, gauge, seconds)
 
 
 def compile_file(path: str | Path, *, order: int | None = None) -> Compilation:

@@ -83,7 +83,7 @@ def of_polynomial(tower: Tower, element: Poly, most: int | None = SHOWN) -> Form
     if len(terms) == 1 and terms[0][0].denominator == 1:
         divisor = 1
     shown = terms if most is None or len(terms) <= most + 1 else terms[:most]
-    variables = [*(symbol(n) for n in tower.symbols), *(g.expression for g in tower.generators)]
+    variables = with_plain_names([*(symbol(n) for n in tower.symbols), *(g.expression for g in tower.generators)])
     listed = tuple((c * divisor, _factors(variables, exponents)) for c, exponents in shown)
     return Formula(divisor, listed, len(terms) - len(shown))
 
@@ -148,9 +148,9 @@ def latex(e: Expression) -> str:
 
 
 def with_plain_names(expressions: Sequence[Expression]) -> list[Expression]:
-    """The expressions with phigen's own symbols under names for readers: ``p:x1`` as ``p_x1``."""
+    """The expressions with phigen's own symbols under names for readers: ``p:x1`` as ``p_x1``, ``gauge:C`` as λ_C."""
     names = [n for n in symbols_of(*expressions) if ":" in n]
-    return substitute(expressions, {n: symbol(n.rstrip(":").replace(":", "_")) for n in names})
+    return substitute(expressions, {n: symbol(n.rstrip(":").replace("gauge:", "λ_").replace(":", "_")) for n in names})
 
 
 def _expanded(expressions: Sequence[Expression], most: int | None) -> Iterator[Formula | None]:

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from phigen.analysis.formulas import SHOWN, latex, of_polynomial, readable_latex
 from phigen.analysis.proof import stage_order
 from phigen.compiler import Compilation
-from phigen.scheme.discretisation import series_of
 from phigen.symbolic.expression import symbol
 
 
@@ -30,7 +29,7 @@ def document(compilation: Compilation, *, full: bool = False) -> str:
 
 
 def _series(compilation: Compilation, most: int | None) -> list[tuple[str, str]]:
-    series = series_of(compilation.system, compilation.realisation, stage_order(compilation).terms)
+    series = compilation.series(stage_order(compilation).terms)
     return [
         (f"S_{{{i}}}", of_polynomial(series.tower, s, most).latex()) for i, s in enumerate(series.terms, 1) if s != 0
     ]

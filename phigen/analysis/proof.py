@@ -12,7 +12,7 @@ from phigen.geometry import checks
 from phigen.geometry.jacobi import jacobi_identity
 from phigen.geometry.system import System, system_from_spec
 from phigen.realisations import axioms
-from phigen.scheme.discretisation import formal_alpha, series_of
+from phigen.scheme.discretisation import formal_alpha
 from phigen.scheme.order import Order
 from phigen.series.hamilton_jacobi import residual
 from phigen.spec.model import Extras, Spec
@@ -123,11 +123,11 @@ def _method(compilation: Compilation) -> Groups:
 
 def series_statements(compilation: Compilation) -> Iterator[Statement]:
     """S_1 … S_k solve the Hamilton–Jacobi equation; the S_i of even index vanish where the order rests on it."""
-    system, realisation, plan = compilation.system, compilation.realisation, stage_order(compilation)
+    system, realisation, plan = compilation.discretised, compilation.realisation, stage_order(compilation)
     terms = plan.terms + (1 if realisation.symmetric else 0)  # S_{k+1} = 0 is what makes the order k + 1
     name = f"∂_t S_t = H(α(x, ∇S_t)) for S_t = {sum_of_terms(plan.terms)}"
     try:
-        series = series_of(system, realisation, terms)
+        series = compilation.series(terms)
         alpha = formal_alpha(system, realisation, terms)
         rest = residual(series, system.hamiltonian, alpha, system.coordinates)
     except OverflowError:

@@ -130,18 +130,20 @@ def series_formulas(compilation: Compilation, most: int | None) -> tuple[list[tu
     """
     from phigen.analysis.formulas import of_polynomial
     from phigen.analysis.proof import stage_order
-    from phigen.scheme.discretisation import series_of
 
     plan = stage_order(compilation)
     more = plan is compilation.order and plan.order <= _MODIFIED_UP_TO
-    series = series_of(compilation.system, compilation.realisation, plan.order + 1 if more else plan.terms)
+    series = compilation.series(plan.order + 1 if more else plan.terms)
     listed = [(i, of_polynomial(series.tower, s, most)) for i, s in enumerate(series.terms[: plan.terms], 1) if s != 0]
     return listed, of_polynomial(series.tower, -series.terms[plan.order], most) if more else None
 
 
 def _series(compilation: Compilation, most: int | None) -> list[tuple[str, str]]:
     listed, correction = series_formulas(compilation, most)
-    pairs = [("S_h", " + ".join(f"h^{i} S_{i}" if i > 1 else "h S_1" for i, _ in listed))]
+    gauge = compilation.gauge
+    taken = [f"λ_{c} {c}" for c in gauge.free] + [f"({value}) {c}" for c, value in gauge.fixed.items()]
+    pairs = [("H", f"H - {' - '.join(taken)} in what follows")] if taken else []
+    pairs += [("S_h", " + ".join(f"h^{i} S_{i}" if i > 1 else "h S_1" for i, _ in listed))]
     pairs += [(f"S_{i}", str(f)) for i, f in listed]
     if correction is not None:
         p = compilation.order.order

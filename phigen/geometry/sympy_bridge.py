@@ -85,7 +85,7 @@ def to_sympy(e: Expression) -> Any:
             case "number":
                 return sympy.Rational(node.value.numerator, node.value.denominator)
             case "symbol":
-                return sympy.Symbol(node.value.rstrip(":").replace(":", "_"), real=True)
+                return sympy.Symbol(node.value.rstrip(":").replace("λ_", "lambda_").replace(":", "_"), real=True)
             case "pi":
                 return sympy.pi
             case "E":

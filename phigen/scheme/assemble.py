@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 from phigen.geometry.shapes import LogCanonical
 from phigen.geometry.system import System
 from phigen.realisations.protocol import BiRealisation
 from phigen.scheme.discretisation import MOST_OPERATIONS, discretise, too_large
-from phigen.scheme.gauge import choose
+from phigen.scheme.gauge import Gauge
 from phigen.scheme.gauge import kernels as gauge_kernels
 from phigen.scheme.generating import STEP
 from phigen.scheme.kernels import observables, path_kernels, step_kernels
@@ -18,7 +16,6 @@ from phigen.scheme.path import build_path
 from phigen.scheme.program import Kernel, Output, Program
 from phigen.scheme.tangent import tangent_kernels, tangent_path
 from phigen.spec.model import NO_EXTRAS, Extras, SolverOptions
-from phigen.symbolic.expression import Expression
 
 DRIVERS = {
     "explicit": "explicit",
@@ -33,7 +30,7 @@ def build_program(
     order: Order,
     *,
     composition: str = "auto",
-    gauge: str | Mapping[str, Expression] = "none",
+    gauge: Gauge | None = None,
     solver: SolverOptions | None = None,
     extras: Extras = NO_EXTRAS,
     title: str = "",
@@ -42,8 +39,8 @@ def build_program(
 ) -> Program:
     """The solver of a system as a program. LimitError if a kernel exceeds `MOST_OPERATIONS`."""
     solver = solver or SolverOptions()
-    gauge_of = choose(system, realisation, gauge)
-    scheme = discretise(gauge_of.applied(system), realisation, order, composition, static=gauge_of.symbols)
+    gauge = gauge or Gauge()
+    scheme = discretise(gauge.applied(system), realisation, order, composition, static=gauge.symbols)
     generating = scheme.generating
     coefficients = generating.coefficients
     path = build_path(system, coefficients) if realisation.path else None
@@ -55,11 +52,11 @@ def build_program(
         kernels |= tangent_kernels(system, kernels, generating, coefficients)
     varied = tangent_path(system, coefficients) if path and extras.tangent else None
     driver = "path" if path else "explicit" if "explicit" in kernels else "newton"
-    kernels |= observables(system) | gauge_kernels(system, realisation, gauge_of)
+    kernels |= observables(system) | gauge_kernels(system, realisation, gauge)
     prepare = Kernel(
         "prepare",
         "everything that depends on parameters and step size only",
-        {"params": system.parameter_names, **gauge_of.inputs, "h": (STEP,)},
+        {"params": system.parameter_names, **gauge.inputs, "h": (STEP,)},
         (Output("coef", tuple(coefficients.values)),),
     )
     main = kernels[{"path": "generate", "newton": "linearise"}.get(driver, driver)]
@@ -70,7 +67,7 @@ def build_program(
         *approximation(realisation),
         f"generating function: {'S_1' if scheme.terms == 1 else f'S_1 ... S_{scheme.terms}'} ({generating.form}"
         + (f", {generating.terms} terms)" if generating.terms else ")"),
-        *gauge_of.facts,
+        *gauge.facts,
         f"step: {DRIVERS[driver]}",
     ]
     return Program(
@@ -84,7 +81,7 @@ def build_program(
         coefficients=len(coefficients.values),
         kernels={"prepare": prepare, **kernels},
         path=path,
-        gauge=gauge_of.free,
+        gauge=gauge.free,
         extras=extras,
         tangent_path=varied,
         fractions=scheme.fractions,

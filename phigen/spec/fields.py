@@ -189,7 +189,7 @@ SPEC = Record(
             "gauge",
             Either({Scalar: _switch("gauge", "auto", "none"), Mapping: FORMULAS}),
             "Casimirs subtracted from H before discretising",
-            default="none",
+            default="auto",
         ),
         Field("scheme", _switch("scheme", "auto"), "how the one-step map is arranged", default="auto"),
         Field("solver", SOLVER, "the inner solve of a step"),

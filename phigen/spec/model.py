@@ -166,7 +166,7 @@ class Spec:
     order: int | None = None  # exactly one of order and terms is set
     terms: int | None = None
     composition: str = "auto"
-    gauge: str | Mapping[str, Expression] = "none"  # or the multiple of each Casimir
+    gauge: str | Mapping[str, Expression] = "auto"  # or the multiple of each Casimir
     scheme: str = "auto"
     solver: SolverOptions = SolverOptions()
     extras: Extras = NO_EXTRAS

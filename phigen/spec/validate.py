@@ -61,7 +61,7 @@ def _parts(raw: Mapping[str, Any], declared: Declarations) -> dict[str, Any]:
         "order": raw.get("order", None if "terms" in raw else DEFAULT_ORDER),
         "terms": raw.get("terms"),
         "composition": raw.get("composition", "auto"),
-        "gauge": _gauge(raw.get("gauge", "none"), declared),
+        "gauge": _gauge(raw.get("gauge", "auto"), declared),
         "scheme": raw.get("scheme", "auto"),
         "solver": _solver(raw.get("solver", {}), declared),
         "targets": without_repetition(raw.get("targets", ("c", "numpy")), ("targets",), declared),

@@ -6,10 +6,10 @@ from support import BODY, NAMES, compile_text, compiled, values
 
 from phigen.errors import LimitError
 from phigen.scheme import assemble, discretisation
-from phigen.scheme.discretisation import GRAPH_TERMS, generating_function, series_of
-from phigen.scheme.order import Order, plan_order
 from phigen.scheme.collected import collect
+from phigen.scheme.discretisation import GRAPH_TERMS, generating_function, series_of
 from phigen.scheme.generating import STEP, collected_form, graph_form
+from phigen.scheme.order import Order, plan_order
 from phigen.scheme.staging import Coefficients
 from phigen.scheme.step import elimination
 from phigen.series.hamilton_jacobi import graph_series

@@ -19,7 +19,15 @@ POINTS = np.array([[0.4, 0.7, 1.9], [0.013, 0.99, 12.5], [0.73, 0.25, 3.0]])  # 
 
 #: Arguments that are in the domain of the function at every point.
 ARGUMENTS = dict.fromkeys(("exp", "sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh"), (-x,))
-ARGUMENTS |= {"asinh": (-z,), "acosh": (z,), "atanh": (-y,), "log": (x,), "expm1": (y,), "abs": (y - z,), "sign": (x - y,)}
+ARGUMENTS |= {
+    "asinh": (-z,),
+    "acosh": (z,),
+    "atanh": (-y,),
+    "log": (x,),
+    "expm1": (y,),
+    "abs": (y - z,),
+    "sign": (x - y,),
+}
 ARGUMENTS |= {"atan2": (-x, y - z), "power": (z, y - 3 * x)}
 
 #: Arguments of φ and its derivatives: near 0, farther, and beyond 16, of either sign.

@@ -98,14 +98,14 @@ def _gauge_values(program: Program) -> dict[str, object]:
     if not count:
         nothing: dict[str, object] = dict.fromkeys(("gauge_members", "gauge_declarations", "gauge_init"), ())
         return nothing | {"gauges": 0, "products": 0, "prepare_arguments": "&s->params"}
-    said = "start at x0 with a gauge of one's own: the step is an exact Poisson map for each fixed gauge"
+    said = "Start at x0 with a gauge of one's own: the step is an exact Poisson map for each fixed gauge"
     return {
         "gauges": count,
         "products": 1 + 2 * count,
         "prepare_arguments": "&s->params, s->gauge",
         "gauge_members": [f"double gauge[{count}]; /* multiples of {', '.join(program.gauge)} taken from H */"],
         "gauge_declarations": [
-            f"/* {said.capitalize()}. */",
+            f"/* {said}. */",
             *_init_gauge(program)[:-1],
             _init_gauge(program)[-1] + ";\n",
         ],

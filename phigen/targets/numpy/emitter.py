@@ -135,7 +135,8 @@ def _function(program: Program, kernel: Kernel) -> str:
 
 
 def _docstring(text: str) -> list[str]:
-    quoted = f'"""{plain(text).replace(chr(34), chr(39)).capitalize()}."""'
+    said = plain(text).replace(chr(34), chr(39))
+    quoted = f'"""{said[:1].upper()}{said[1:]}."""'
     return textwrap.wrap(quoted, 104, initial_indent="    ", subsequent_indent="    ")
 
 
