@@ -1,0 +1,131 @@
+"""Backward error analysis: the Hamiltonian whose exact flow a step is, and the one that depends on time.
+
+The map of step h is the time-h flow of a formal series H̃_h = H_0 + h H_1 + h² H_2 + …, H_0 = H. It is found from this:
+the full Hamilton–Jacobi transform of H̃_h at time h is the truncated S_h = h S_1 + … + h^k S_k of the method. With the
+time written σh, the transform S(σ) = Σ h^r s_r(σ) of H̃_h solves
+
+    ∂_σ s_r = coefficient of h^(r−1) in H̃_h(α(x, ∇S(σ))) = H_{r−1} + known terms,    s_r(0) = 0,
+
+and s_r(1) is S_r for r ≤ k and 0 beyond: one linear equation for each H_{r−1}. The first correction is −h^k S_{k+1}.
+In a symmetric bi-realisation H̃_h is even in h. See section 6 of E. Hairer, C. Lubich, G. Wanner, Geometric Numerical
+Integration, chapter IX, for generating functions on canonical structures.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from phigen.series.hamilton_jacobi import PolynomialSeries, composed, momentum, polynomial_series
+from phigen.symbolic.expression import Expression
+from phigen.symbolic.taylor import Taylor
+from phigen.symbolic.tower import Poly, Tower
+
+#: The fraction σ of the step, as a symbol.
+FRACTION = "sigma:"
+
+#: Corrections with more monomials than this are not computed further.
+MOST_TERMS = 5_000
+
+
+@dataclass(frozen=True)
+class ModifiedSeries:
+    """H_0, H_1, … of the modified Hamiltonian H̃_h = Σ h^j H_j, as elements of a tower; ``terms[j]`` is H_j."""
+
+    tower: Tower
+    terms: tuple[Poly, ...]
+
+
+def modified_series(
+    hamiltonian: Expression,
+    alpha: Sequence[Expression],
+    coordinates: Sequence[str],
+    parameters: Sequence[str],
+    terms: int,
+    power: int,
+    *,
+    symmetric: bool,
+) -> ModifiedSeries:
+    """H_0 … H_power of the method that takes S_1 … S_terms; α must be right up to degree ``power`` in p.
+
+    Raises `OverflowError` if a correction has more than `MOST_TERMS` monomials.
+    """
+    symbols = [*parameters, FRACTION]
+    kept = polynomial_series(hamiltonian, alpha, coordinates, symbols, min(terms, power + 1), symmetric=symmetric)
+    found = _Recursion(kept, alpha, coordinates)
+    for r in range(1, power + 2):
+        found.advance(r, vanishing=symmetric and r % 2 == 0)
+    return ModifiedSeries(kept.tower, tuple(found.terms))
+
+
+class _Recursion:
+    """The state of the recursion: H_0 … H_{r−1}, and the slopes of s_1 … s_r along the coordinates."""
+
+    def __init__(self, kept: PolynomialSeries, alpha: Sequence[Expression], coordinates: Sequence[str]) -> None:
+        self.tower, self.kept = kept.tower, kept.terms
+        self.alpha, self.coordinates = alpha, coordinates
+        self.momenta = [momentum(c) for c in coordinates]
+        self.terms: list[Poly] = []
+        self.slopes: list[list[Poly]] = [[self.tower.zero] * len(coordinates)]
+        self.composed: list[tuple[Expression, Taylor] | None] = []
+        self.fraction = self.tower.names.index(FRACTION)
+
+    def advance(self, r: int, *, vanishing: bool) -> None:
+        """Find H_{r−1} and s_r."""
+        if vanishing:
+            self._keep(self.tower.zero, self.tower.zero)
+            return
+        known = self._integral(self.tower.combine([self._level(j, r - 1 - j) for j in range(r - 1)]))
+        wanted = self.kept[r - 1] if r <= len(self.kept) else self.tower.zero
+        correction = wanted - self._at_one(known)
+        if len(correction) > MOST_TERMS:
+            raise OverflowError(f"H_{r - 1} has {len(correction)} terms")
+        self._keep(correction, known + self.tower.variable(FRACTION) * correction)
+
+    def _keep(self, correction: Poly, s: Poly) -> None:
+        self.terms.append(correction)
+        self.slopes.append([self.tower.derivative(s, c) for c in self.coordinates])
+        if correction == 0:
+            self.composed.append(None)
+            return
+        target = composed(self.tower.expression(correction), self.coordinates, self.alpha)
+        self.composed.append((target, Taylor([target], self.tower, self.momenta)))
+
+    def _level(self, j: int, level: int) -> Poly:
+        """The coefficient of h^level in H_j(α(x, ∇S(σ)))."""
+        pair = self.composed[j]
+        if pair is None:
+            return self.tower.zero
+        target, taylor = pair
+        while len(taylor.coefficients(target)) <= level:
+            taylor.advance(dict(zip(self.momenta, self.slopes[len(taylor.coefficients(target))], strict=True)))
+        return taylor.coefficients(target)[level]
+
+    def _integral(self, element: Poly) -> Poly:
+        """∫_0^σ of an element."""
+        integrated: dict[Any, Any] = {}
+        for m, c in element.to_dict().items():
+            e = int(m[self.fraction]) + 1
+            integrated[(*m[: self.fraction], e, *m[self.fraction + 1 :])] = c / e
+        return self.tower.context.from_dict(integrated)
+
+    def _at_one(self, element: Poly) -> Poly:
+        """The element at σ = 1."""
+        collected: dict[Any, Any] = {}
+        for m, c in element.to_dict().items():
+            key = (*m[: self.fraction], 0, *m[self.fraction + 1 :])
+            collected[key] = collected[key] + c if key in collected else c
+        return self.tower.context.from_dict(collected)
+
+
+def time_dependent(series: PolynomialSeries, time: str) -> Expression:
+    """∂_tS_t(y) = Σ i t^(i−1) S_i(y), which is H_t(x) of the paper's theorem at α(y, ∇S_t(y)) = x.
+
+    The steps Φ_t: x ↦ β(y, ∇S_t(y)) of all sizes t are its flow: ∂_tΦ_t(x) = DΦ_t(x) π(x) ∇H_t(x). ``time`` is the name
+    of t, a symbol of the tower; for the untruncated series H_t = H.
+    """
+    t, tower = series.tower.variable(time), series.tower
+    return tower.expression(
+        tower.combine([s * tower.constant(i) * t ** (i - 1) for i, s in enumerate(series.terms, 1)])
+    )
