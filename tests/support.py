@@ -4,14 +4,19 @@ from __future__ import annotations
 
 import ctypes
 import os
+import shlex
+import shutil
+import subprocess
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import mpmath
 import numpy as np
+import pytest
 
 from phigen import resources, spec
 from phigen.compiler import Compilation, compile_spec, emit
@@ -32,15 +37,20 @@ COMMAND = "phigen build"
 DIGITS = 50
 
 
+def plain(given: spec.Spec) -> spec.Spec:
+    """The spec with no gauge where it leaves that to phigen: tests/generated/test_gauge.py is about gauges."""
+    return replace(given, gauge="none") if given.gauge == "auto" else given
+
+
 def compile_text(text: str, order: int | None = None) -> Compilation:
     """The compilation of a spec given as YAML without its first two keys."""
-    return compile_spec(spec.loads(f"phigen: 1\nname: t\n{text}"), order=order)
+    return compile_spec(plain(spec.loads(f"phigen: 1\nname: t\n{text}")), order=order)
 
 
 @cache
 def compiled(name: str, order: int | None = None) -> Compilation:
     """The compilation of a system of the corpus."""
-    return compile_spec(spec.load(resources.bundled_specs() / f"{name}.yaml"), order=order)
+    return compile_spec(plain(spec.load(resources.bundled_specs() / f"{name}.yaml")), order=order)
 
 
 _made: dict[tuple[Any, ...], tuple[Compilation, Any]] = {}
@@ -84,6 +94,10 @@ def _solver(compilation: Compilation, target: str) -> Solver:
     return Solver(NumpySolver.from_source(files(compilation, "numpy")[f"{names.name}.py"], names), names)
 
 
+#: Every run of the corpus, as pairs of names.
+RUNS = [(name, run) for name in NAMES for run in spec.load(resources.bundled_specs() / f"{name}.yaml").runs]
+
+
 def first_run(compilation: Compilation) -> Run:
     """The first run of a spec."""
     return next(iter(compilation.spec.runs.values()))
@@ -98,9 +112,9 @@ class Setting:
     parameters: Mapping[str, float]
 
 
-def setting(compilation: Compilation, run: Run | None = None) -> Setting:
-    """The numbers of a run of the spec, the first unless another is given."""
-    run = run or first_run(compilation)
+def setting(compilation: Compilation, name: str | None = None) -> Setting:
+    """The numbers of a run of the spec, the first unless another is named."""
+    run = compilation.spec.runs[name] if name else first_run(compilation)
     defaults = {p.name: float(p.value) for p in compilation.spec.parameters}
     return Setting(
         tuple(float(v) for v in run.initial),
@@ -118,6 +132,17 @@ def casimir_scales(compilation: Compilation, at: Setting) -> list[float]:
 
 def _fractions(coordinates: Sequence[str], at: Setting) -> dict[str, Fraction]:
     return {k: Fraction(v) for k, v in [*zip(coordinates, at.x, strict=True), *at.parameters.items()]}
+
+
+def precisely(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Run with `DIGITS` digits of mpmath."""
+
+    def wrapped(*args: Any, **kwargs: Any) -> Any:
+        with mpmath.workdps(DIGITS):
+            return function(*args, **kwargs)
+
+    wrapped.__name__, wrapped.__doc__ = function.__name__, function.__doc__
+    return wrapped
 
 
 # -- the struct of the C solver, looked at from outside ------------------------------------------------------------
@@ -164,24 +189,13 @@ class RawC:
         """``NAME_integrate``."""
         return self.call("integrate", ctypes.c_int, self.here, ctypes.c_double(h), ctypes.c_size_t(steps))
 
-    @property
+    @precisely
     def exact_state(self) -> list[Any]:
         """x + carry, in many digits."""
         return [mpmath.mpf(float(x)) + mpmath.mpf(float(c)) for x, c in zip(self.x, self.carry, strict=True)]
 
 
 # -- the scheme in many digits, without anything of phigen.scheme and phigen.targets --------------------------------
-
-
-def precisely(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Run with `DIGITS` digits of mpmath."""
-
-    def wrapped(*args: Any, **kwargs: Any) -> Any:
-        with mpmath.workdps(DIGITS):
-            return function(*args, **kwargs)
-
-    wrapped.__name__, wrapped.__doc__ = function.__name__, function.__doc__
-    return wrapped
 
 
 def values(roots: Sequence[Expression], at: Mapping[str, Any]) -> list[Any]:
@@ -242,33 +256,57 @@ def _phi(order: int, s: Any) -> Any:
 
 
 class PreciseStep:
-    """One step of the scheme in many digits: Newton's method on α(y, ∇S_h(y)) = x, then x' = β(y, ∇S_h(y)).
+    """The one-step map in many digits: ``step(x)``, and ``defect(x)``, how far it is from a Poisson map at x.
 
-    Made from the bi-realisation and the graph series alone. ``tangent`` gives DΦ by implicit differentiation.
+    Made from the bi-realisation and the graph series alone, by Newton's method on α(y, ∇S_h(y)) = x and
+    x' = β(y, ∇S_h(y)); the tangent map comes from implicit differentiation. For paths see precise_path.py.
     """
 
     def __init__(self, compilation: Compilation, parameters: Mapping[str, float], h: float) -> None:
-        realisation, system = compilation.realisation, compilation.system
-        self.coordinates = system.coordinates
-        self.n = len(self.coordinates)
-        terms = graph_series(
-            system.hamiltonian,
-            realisation.alpha,
-            self.coordinates,
-            compilation.order.terms,
-            symmetric=realisation.symmetric,
-        )
-        s = total(number(Fraction(h)) ** (i + 1) * term for i, term in enumerate(terms))
-        slope = gradient(s, self.coordinates)
+        self.n, self._poisson = compilation.system.dimension, [e for row in compilation.system.poisson for e in row]
+        self.coordinates, self._parameters = compilation.system.coordinates, dict(parameters)
+        fractions = compilation.program.fractions
+        self._stages = [_Stage(compilation, parameters, Fraction(f) * Fraction(h)) for f in fractions]
+
+    @precisely
+    def __call__(self, x: Sequence[Any]) -> list[Any]:
+        """Φ(x)."""
+        for stage in self._stages:
+            x = stage.solve(x)
+        return list(x)
+
+    def poisson(self, x: Sequence[Any]) -> Any:
+        """The matrix π(x)."""
+        at = {**self._parameters, **dict(zip(self.coordinates, x, strict=True))}
+        return _columns(values(self._poisson, at), self.n, self.n).T
+
+    @precisely
+    def tangent(self, x: Sequence[Any]) -> tuple[list[Any], Any]:
+        """Φ(x) and DΦ(x)."""
+        product = mpmath.eye(self.n)
+        for stage in self._stages:
+            x, tangent = stage.solve_with_tangent(x)
+            product = tangent * product
+        return list(x), product
+
+    @precisely
+    def defect(self, x: Sequence[Any]) -> float:
+        """|DΦ π DΦᵀ − π∘Φ| relative to |π∘Φ| at x."""
+        image, tangent = self.tangent(x)
+        return relative_defect(tangent, self.poisson(x), self.poisson(image))
+
+
+class _Stage:
+    def __init__(self, compilation: Compilation, parameters: Mapping[str, float], h: Fraction) -> None:
+        realisation, self.coordinates = compilation.realisation, compilation.system.coordinates
+        self.n, self._parameters = len(self.coordinates), dict(parameters)
+        slope = _slope(compilation, h)
         hessian = [d for c in self.coordinates for d in derivatives(slope, c)]  # column by column
         self._momenta = [*slope, *hessian]
         both = [*realisation.alpha, *realisation.beta]
         names = [*self.coordinates, *realisation.covector]
         self._maps = [*both, *(d for name in names for d in derivatives(both, name))]
         self._covector = realisation.covector
-        self._poisson = [e for row in system.poisson for e in row]
-        self._field = system.vector_field()
-        self._parameters = dict(parameters)
 
     def _linearised(self, y: Sequence[Any]) -> tuple[Any, Any, Any, Any]:
         n, at = self.n, {**self._parameters, **dict(zip(self.coordinates, y, strict=True))}
@@ -280,32 +318,34 @@ class PreciseStep:
         alpha, beta = mpmath.matrix(maps[:n]), mpmath.matrix(maps[n : 2 * n])
         return alpha, beta, total_derivative[:n, :], total_derivative[n:, :]
 
-    @precisely
-    def solve(self, x: Sequence[Any]) -> tuple[list[Any], Any]:
-        """Φ(x) and DΦ(x)."""
+    def _solved(self, x: Sequence[Any]) -> tuple[Any, Any, Any]:
+        """β, Dα and Dβ, the derivatives along y, where α = x."""
         y, x = mpmath.matrix(list(x)), mpmath.matrix(list(x))
         for _ in range(60):
             alpha, beta, d_alpha, d_beta = self._linearised(list(y))
             delta = mpmath.lu_solve(d_alpha, alpha - x)
             if mpmath.norm(delta, mpmath.inf) <= mpmath.norm(y, mpmath.inf) * mpmath.mpf(10) ** (4 - DIGITS):
-                return list(beta), d_beta * mpmath.inverse(d_alpha)
+                return beta, d_alpha, d_beta
             y -= delta
         raise ArithmeticError("no convergence")
 
-    def __call__(self, x: Sequence[Any]) -> list[Any]:
-        """Φ(x)."""
-        return self.solve(x)[0]
+    def solve(self, x: Sequence[Any]) -> list[Any]:
+        return list(self._solved(x)[0])
 
-    def poisson(self, x: Sequence[Any]) -> Any:
-        """The matrix π(x)."""
-        at = {**self._parameters, **dict(zip(self.coordinates, x, strict=True))}
-        return _columns(values(self._poisson, at), self.n, self.n).T
+    def solve_with_tangent(self, x: Sequence[Any]) -> tuple[list[Any], Any]:
+        beta, d_alpha, d_beta = self._solved(x)
+        return list(beta), d_beta * mpmath.inverse(d_alpha)
 
-    @precisely
-    def defect(self, x: Sequence[Any]) -> float:
-        """|DΦ π DΦᵀ − π∘Φ| relative to |π∘Φ| at x."""
-        image, tangent = self.solve(x)
-        return relative_defect(tangent, self.poisson(x), self.poisson(image))
+
+def _slope(compilation: Compilation, h: Fraction) -> list[Expression]:
+    """∇S_h as a graph, with h a number."""
+    # A composition is made of steps of order 2.
+    system, terms = compilation.system, compilation.order.terms if len(compilation.program.fractions) == 1 else 1
+    realisation = compilation.realisation
+    series = graph_series(
+        system.hamiltonian, realisation.alpha, system.coordinates, terms, symmetric=realisation.symmetric
+    )
+    return gradient(total(number(h) ** (i + 1) * s for i, s in enumerate(series)), system.coordinates)
 
 
 def _columns(entries: Sequence[Any], rows: int, columns: int) -> Any:
@@ -366,6 +406,32 @@ def symbols(names: str) -> list[Expression]:
     return [symbol(n) for n in names.split()]
 
 
-def in_ci() -> bool:
-    """Whether nothing may be skipped for want of a tool."""
-    return bool(os.environ.get("CI"))
+def tool(name: str) -> str:
+    """The path of a program; without it the test is skipped, or fails where PHIGEN_ALL_TOOLS is set."""
+    path = shutil.which(name)
+    if path is None:
+        if os.environ.get("PHIGEN_ALL_TOOLS"):
+            pytest.fail(f"{name} is not installed")
+        pytest.skip(f"{name} is not installed")
+    return path
+
+
+def run(command: Sequence[str | Path], folder: Path, **environment: str) -> str:
+    """What a command prints; the test fails if it fails."""
+    done = subprocess.run(
+        [str(c) for c in command],
+        cwd=folder,
+        env={**os.environ, **environment},
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=300,
+    )
+    assert done.returncode == 0, f"{shlex.join(map(str, command))}\n{done.stdout[-2000:]}{done.stderr[-4000:]}"
+    return done.stdout
+
+
+def write(folder: Path, texts: Mapping[str, str]) -> None:
+    """Put files into a folder."""
+    for name, text in texts.items():
+        (folder / name).write_text(text, encoding="utf-8")

@@ -15,6 +15,7 @@ from phigen.symbolic.tower import Tower
 
 q, p, a = symbols("q p p:q")
 b = symbol("p:p")
+CAYLEY = "birealisation: cayley\norder: 2\n"
 HALF = number(Fraction(1, 2))
 MIDPOINT = (q - HALF * b, p + HALF * a)
 ONE_SIDED = (q, p + a)
@@ -66,7 +67,7 @@ def test_oscillator_in_the_midpoint_chart_is_a_tangent():
 
 def test_linear_hamiltonian_on_so3_in_the_cayley_chart_is_a_tangent():
     """S_t = (2/|a|) tan(t|a|/2) H for H = a·x, so S_3 = |a|² H/12."""
-    body = compile_text(BODY.replace("x1**2/2 + x2**2/4 + x3**2/6", "x1/2 - 3*x2 + 2*x3/7") + "order: 2\n")
+    body = compile_text(BODY.replace("x1**2/2 + x2**2/4 + x3**2/6", "x1/2 - 3*x2 + 2*x3/7") + CAYLEY)
     energy, square = body.system.hamiltonian, Fraction(1, 4) + 9 + Fraction(4, 49)
     found = series(body, 7, symmetric=False)
     assert same(found, 3, number(square / 12) * energy)
@@ -74,8 +75,15 @@ def test_linear_hamiltonian_on_so3_in_the_cayley_chart_is_a_tangent():
         assert same(found, 2 * k + 1, number(c * square**k) * energy)
 
 
+def test_linear_hamiltonian_on_so3_in_the_exponential_chart_is_its_own_series():
+    """S_t = tH: the exponential is exact for linear Hamiltonians."""
+    text = BODY.replace("x1**2/2 + x2**2/4 + x3**2/6", "x1/2 - 3*x2 + 2*x3/7")
+    found = series(compile_text(text + "birealisation: exponential\norder: 2\n"), 5, symmetric=False)
+    assert all(found.tower.is_zero(term) for term in found.terms[1:])
+
+
 def test_third_term_of_the_rigid_body():
-    found = series(compile_text(BODY + "order: 2\n"), 4, symmetric=False)
+    found = series(compile_text(BODY + CAYLEY), 4, symmetric=False)
     x1, x2, x3 = symbols("x1 x2 x3")
     quartic = 216 * x1**4 + 171 * x1**2 * x2**2 + 120 * x1**2 * x3**2 + 27 * x2**4 + 33 * x2**2 * x3**2 + 8 * x3**4
     assert same(found, 1, x1**2 / 2 + x2**2 / 4 + x3**2 / 6)

@@ -1,0 +1,121 @@
+"""Over long times: Casimirs to round-off, energy within a window that does not grow."""
+
+import numpy as np
+import pytest
+from support import NAMES, RUNS, compiled, setting, solver, values
+
+from phigen.symbolic.expression import gradient
+
+STEPS = 100_000
+WINDOWS = 10
+
+#: Runs that end earlier, and why.
+FEWER_STEPS = {
+    ("lotka_volterra", "blow_up"): 2_550,  # the solution itself ends soon after
+    ("lotka_volterra", "takeover"): 50_000,  # two species die out like exp(−t); below 1e-308 nothing is left of them
+}
+
+#: Runs with an angle that grows for ever: the Casimirs cannot be better than the angle's own rounding.
+GROWING = {("nambu_pendulum", "rotations")}
+
+#: The Laplace–Runge–Lenz vector turns: every symplectic method has a precession of the order of its energy error.
+PRECESSING = {("kepler", "A1"), ("kepler", "A2")}
+
+#: Energies that are conserved exactly, but for rounding, have no windows to speak of.
+ROUND_OFF = 1e-13
+
+
+@pytest.fixture(scope="module")
+def trajectories():
+    """Long trajectories in C, each computed once."""
+    done = {}
+
+    def trajectory(name, run):
+        if (name, run) not in done:
+            compilation = compiled(name)
+            at, steps = setting(compilation, run), FEWER_STEPS.get((name, run), STEPS)
+            done[name, run] = solver(compilation, "c").integrate(
+                at.x, at.h, steps, stride=max(1, steps // 4_000), parameters=at.parameters
+            )
+        return done[name, run]
+
+    return trajectory
+
+
+def conditioning(compilation, states, parameters, casimir):
+    """Σ|x_i ∂C/∂x_i|, the largest of some states: relative rounding of x by ε changes C by ε times that."""
+    slopes = gradient(compilation.system.casimirs[casimir], compilation.system.coordinates)
+    sizes = []
+    for row in states[:: max(1, len(states) // 50)]:
+        at = {**parameters, **dict(zip(compilation.system.coordinates, row.tolist(), strict=True))}
+        sizes.append(sum(abs(float(d) * x) for d, x in zip(values(slopes, at), row, strict=True)))
+    return max(sizes)
+
+
+@pytest.mark.parametrize(("name", "run"), RUNS)
+def test_casimirs_are_constant_to_round_off(name, run, trajectories):
+    trajectory = trajectories(name, run)
+    for casimir, found in trajectory.casimirs.items():
+        scale = size_of_casimir(compiled(name), trajectory, casimir, growing=(name, run) in GROWING)
+        assert np.max(np.abs(found - found[0])) <= 1e-13 * scale, casimir
+
+
+@pytest.mark.parametrize("name", [name for name in NAMES if compiled(name).system.casimirs])
+def test_casimirs_are_constant_to_round_off_in_numpy(name):
+    compilation = compiled(name)
+    at, steps = setting(compilation), 20 if compilation.program.driver == "path" else 200
+    trajectory = solver(compilation, "numpy").integrate(at.x, at.h, steps, stride=10, parameters=at.parameters)
+    for casimir, found in trajectory.casimirs.items():
+        scale = size_of_casimir(compilation, trajectory, casimir)
+        assert np.max(np.abs(found - found[0])) <= 2e-15 * scale, casimir
+
+
+def size_of_casimir(compilation, trajectory, casimir, *, growing=False):
+    """The value of a Casimir; where that is 0, or x grows, what unit relative changes of x make of it."""
+    value = abs(trajectory.casimirs[casimir][0])
+    if growing:
+        return conditioning(compilation, trajectory.x, trajectory.parameters, casimir)
+    terms = conditioning(compilation, trajectory.x[:1], trajectory.parameters, casimir)
+    return value if value > 1e-3 * terms else terms
+
+
+def energy_scale(compilation, trajectory):
+    """The energy, or where it is nearly zero, its variation over unit relative changes of x."""
+    slopes = gradient(compilation.system.hamiltonian, compilation.system.coordinates)
+    at = {**trajectory.parameters, **dict(zip(compilation.system.coordinates, trajectory.x[0].tolist(), strict=True))}
+    slope = [float(d) for d in values(slopes, at)]
+    return max(abs(trajectory.energy[0]), 1e-3 * float(np.abs(np.array(slope) * trajectory.x[0]).sum()))
+
+
+@pytest.mark.parametrize(("name", "run"), [pair for pair in RUNS if pair != ("lotka_volterra", "blow_up")])
+def test_energy_error_does_not_grow(name, run, trajectories):
+    """The largest error of the last window is below 1.5 times that of the first, or both are round-off."""
+    trajectory = trajectories(name, run)
+    error = np.abs(trajectory.energy - trajectory.energy[0]) / energy_scale(compiled(name), trajectory)
+    windows = [window.max() for window in np.array_split(error[1:], WINDOWS)]
+    assert windows[-1] < 1.5 * windows[0] or max(windows) <= ROUND_OFF
+    slope = np.polyfit(np.linspace(0, 1, len(error)), error, 1)[0]
+    assert abs(slope) <= max(0.5 * max(windows), ROUND_OFF), "a linear trend"
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_invariants_that_are_not_asked_for_do_not_drift(name, trajectories):
+    """Further first integrals of integrable systems keep to a window as well."""
+    compilation = compiled(name)
+    run = next(iter(compilation.spec.runs))
+    trajectory = trajectories(name, run)
+    rows = trajectory.x[:: len(trajectory) // 1000]
+    for invariant, e in compilation.system.invariants.items():
+        if (name, invariant) in PRECESSING:
+            continue
+        found = np.array([float(v) for v in evaluated(compilation, e, rows, trajectory.parameters)])
+        error = np.abs(found - found[0])
+        halves = [half.max() for half in np.array_split(error[1:], 2)]
+        scale = max(abs(found[0]), np.abs(rows).max() * 1e-3)
+        assert halves[1] < 1.5 * halves[0] or max(halves) <= ROUND_OFF * scale, invariant
+
+
+def evaluated(compilation, e, rows, parameters):
+    """Values of an expression at many states."""
+    names = compilation.system.coordinates
+    return [values([e], {**parameters, **dict(zip(names, row.tolist(), strict=True))})[0] for row in rows]
