@@ -41,9 +41,6 @@ BUILDERS: dict[str, Builder] = {
     )
 }
 
-#: Kinds of the spec format that a later version brings.
-PLANNED: tuple[str, ...] = ()
-
 
 def realise(system: System, choice: BirealisationChoice | None = None) -> BiRealisation:
     """The bi-realisation that a spec asks for (default: ``auto``).
@@ -66,8 +63,6 @@ def builder(kind: str) -> Builder:
     found = BUILDERS.get(kind)
     if found is not None:
         return found
-    if kind in PLANNED:
-        raise SpecError([Diagnostic(f"birealisation {kind} is planned but not available yet", hint=_choices())])
     raise SpecError([Diagnostic(f"unknown birealisation {kind!r}", hint=_choices())])
 
 

@@ -8,8 +8,9 @@ import pytest
 from geometry.building import system
 
 from phigen.errors import SpecError
-from phigen.realisations.catalogue import BUILDERS, PLANNED, realise
+from phigen.realisations.catalogue import BUILDERS, realise
 from phigen.spec.model import BirealisationChoice
+from phigen.spec.names import BIREALISATIONS
 from phigen.symbolic.expression import ONE, symbol
 
 
@@ -39,10 +40,8 @@ def test_refusals_carry_the_place_in_the_spec():
     assert caught.value.diagnostics[0].location.line == 4  # of poisson, for lack of a birealisation
 
 
-@pytest.mark.parametrize("kind", PLANNED)
-def test_planned_kinds_are_refused_as_planned(kind):
-    with pytest.raises(SpecError, match=f"{kind} is planned"):
-        realise(system("x y", "{brackets: {x: {y: 1}}}"), BirealisationChoice(kind))
+def test_every_kind_of_the_spec_format_has_a_builder():
+    assert set(BUILDERS) == set(BIREALISATIONS)
 
 
 def test_unknown_kind_lists_the_available_ones():
