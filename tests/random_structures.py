@@ -26,6 +26,8 @@ def draw(kind: str, seed: int) -> Drawn:
     """The system of a kind and a seed; equal on every machine and Python."""
     source = random.Random(f"{kind} {seed}")
     pi, casimirs = KINDS[kind](source, seed)
+    while pi.is_zero_matrix:
+        pi, casimirs = KINDS[kind](source, seed)
     n = pi.shape[0]
     x = X[:n]
     brackets = {

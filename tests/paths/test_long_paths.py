@@ -3,7 +3,7 @@
 import mpmath
 import numpy as np
 import pytest
-from precise_path import PATH_DIGITS, PreciseSystem, compile_paths
+from precise_path import PATH_DIGITS, PrecisePathStep, PreciseSystem, compile_paths
 from support import BODY, TARGETS, RawC, gradient, solver, values
 
 from phigen import StepError
@@ -20,6 +20,12 @@ LONG = [
 ]
 
 
+LONG_TEXT = """coordinates: [x, y, z]
+poisson: {{matrix: [[0, -z, y], [z, 0, -x], [-y, x, 0]]}}
+hamiltonian: {hamiltonian}
+"""
+
+
 @pytest.mark.parametrize("target", TARGETS)
 @pytest.mark.parametrize(("coordinates", "form", "hamiltonian", "start", "h"), LONG)
 def test_long_path_is_followed_in_pieces(coordinates, form, hamiltonian, start, h, target):
@@ -31,6 +37,16 @@ def test_long_path_is_followed_in_pieces(coordinates, form, hamiltonian, start, 
     solve = solver(compilation, target)
     assert np.max(np.abs(solve.step(start, h=h) - end)) < 200 * EPS * max(1, *np.abs(end))
     assert np.max(np.abs(solve.step(end, h=-h) - start)) < 2000 * EPS * max(1, *np.abs(end))
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_mean_of_a_path_in_pieces_enters_the_equation(target):
+    text = LONG_TEXT.format(hamiltonian="3*x - y + 2*z + (x**2 + y*z)/40")
+    compilation, start, h = compile_paths(text, 2), (0.3, -0.8, 0.5), 3.0
+    image = [float(v) for v in PrecisePathStep(compilation, {}, h)(start)]
+    assert np.max(np.abs(solver(compilation, target).step(start, h=h) - image)) < 100 * EPS
+    plain = compile_paths(LONG_TEXT.format(hamiltonian="3*x - y + 2*z"), 2)
+    assert np.max(np.abs(solver(plain, target).step(start, h=h) - image)) > 1e-3
 
 
 def test_rotation_by_many_turns_keeps_the_norm():

@@ -27,7 +27,7 @@ DRAWS = [pytest.param(kind, seed, id=f"{kind}-{seed}") for kind in KINDS for see
 def system_of(kind, seed, order):
     """The compilation of a drawn system, and the draw."""
     drawn = draw(kind, seed)
-    return compile_spec(spec.loads(f"phigen: 1\nname: t\n{drawn.text}"), order=order), drawn
+    return compile_text(drawn.text, order), drawn
 
 
 @cache
@@ -92,23 +92,33 @@ def test_observed_order_is_the_stated_one(kind, seed, order):
 
 
 @pytest.mark.parametrize(("kind", "seed"), DRAWS)
-def test_casimirs_are_kept_and_steps_reversed(kind, seed):
+def test_casimirs_are_constant_to_roundoff(kind, seed):
     compilation, drawn = system_of(kind, seed, 4)
     h, casimirs = float(scale_of(kind, seed)), list(compilation.system.casimirs.values())
     raw = RawC(compilation)
     raw.init(drawn.start, {})
     with mpmath.workdps(30):
         system = PreciseSystem(compilation, {})
-        before = values(casimirs, system.at(drawn.start))
-        for _ in range(10):
-            assert raw.integrate(h, 20) == 0
-            scale = float(np.max(np.abs(raw.x))) ** 2
-            after = values(casimirs, system.at(state_of(raw)))
-            for a, b in zip(after, before, strict=True):
-                assert abs(a - b) < 1e-13 * max(1, scale, abs(b))
+        before, largest = values(casimirs, system.at(drawn.start)), 0.0
+        for _ in range(40):
+            if raw.integrate(h, 5):
+                break  # some of these solutions reach infinity in finite time
+            largest = max(largest, float(np.max(np.abs(raw.x))))
+            for a, b in zip(values(casimirs, system.at(state_of(raw))), before, strict=True):
+                assert abs(a - b) < 1e-13 * max(1, largest**3, abs(b))
+    assert raw.counters[0] >= 20
     assert len(casimirs) >= len(drawn.casimirs)
-    assert raw.integrate(-h, 200) == 0
-    assert np.max(np.abs(raw.x - drawn.start)) < 1e-10
+
+
+@pytest.mark.parametrize(("kind", "seed"), DRAWS)
+def test_steps_back_undo_steps(kind, seed):
+    compilation, drawn = system_of(kind, seed, 4)
+    h, raw = float(scale_of(kind, seed)), RawC(compilation)
+    raw.init(drawn.start, {})
+    assert raw.integrate(h, 20) == 0
+    assert np.max(np.abs(raw.x - drawn.start)) > 1e-3
+    assert raw.integrate(-h, 20) == 0
+    assert np.max(np.abs(raw.x - drawn.start)) < 1e-12
 
 
 @pytest.mark.parametrize(("kind", "seed"), DRAWS)
