@@ -1,0 +1,22 @@
+/* Integrate by one of `methods`: chunks times chunk steps, the state after each chunk to out. Gives up after `limit`
+   seconds. `seconds` is the CPU time; a solver's start-up is part of it. */
+int bench_run(int method, const double *start, double h, long chunk, long chunks, double limit, double *out,
+              double *seconds, double *evaluations)
+{
+    real x[DIM];
+    for (int i = 0; i < DIM; ++i) x[i] = start[i];
+    memset(&gauss, 0, sizeof gauss);
+    const double began = cpu_time();
+    int status = OK;
+    for (long c = 0; c < chunks && status == OK; ++c) {
+        methods[method](x, h, chunk);
+        for (int i = 0; i < DIM; ++i) {
+            out[c * DIM + i] = (double)x[i];
+            if (!(fabs(x[i]) < 1e9)) status = NOT_FINITE;
+        }
+        if (cpu_time() - began > limit) status = c + 1 < chunks ? TOO_SLOW : OK;
+    }
+    *seconds = cpu_time() - began;
+    *evaluations = (double)gauss.evaluations;
+    return status;
+}

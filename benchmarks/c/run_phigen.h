@@ -1,0 +1,26 @@
+/* The same for phigen's solver, named `bench`. */
+int bench_run(int method, const double *start, double h, long chunk, long chunks, double limit, double *out,
+              double *seconds, double *evaluations)
+{
+    static bench_solver solver;
+    (void)method;
+    const double began = cpu_time();
+    int status = bench_init(&solver, NULL, start);
+    for (long c = 0; c < chunks && status == OK; ++c) {
+        status = bench_integrate(&solver, h, (size_t)chunk);
+        memcpy(out + c * bench_DIM, solver.x, sizeof solver.x);
+        if (status == OK && c + 1 < chunks && cpu_time() - began > limit) status = TOO_SLOW;
+    }
+    *seconds = cpu_time() - began;
+    *evaluations = (double)solver.evaluations;
+    return status;
+}
+
+/* The ensemble function of the solver, timed. */
+int bench_many(double *x, long members, double h, long steps, double *seconds)
+{
+    const double began = cpu_time();
+    const int status = bench_ensemble(NULL, x, (size_t)members, h, (size_t)steps, NULL);
+    *seconds = cpu_time() - began;
+    return status;
+}

@@ -1,0 +1,25 @@
+/* Kicks by gravity, and rotations of P and G about the axes of the body. The moments 1 and 2 are equal. */
+INLINE void kick(double x[6], double h)
+{
+    x[1] += h * x[5];
+    x[2] -= h * x[4];
+}
+
+INLINE void rotate(double x[6], int a, int b, double angle)
+{
+    double s, c;
+    sine_cosine(angle, &s, &c);
+    turn(&x[a], &x[b], s, c);
+    turn(&x[3 + a], &x[3 + b], s, c);
+}
+
+INLINE void splitting_step(double x[6], double h)
+{
+    kick(x, 0.5 * h);
+    rotate(x, 1, 2, 0.25 * h * x[0]);
+    rotate(x, 2, 0, 0.25 * h * x[1]);
+    rotate(x, 0, 1, h * x[2]);
+    rotate(x, 2, 0, 0.25 * h * x[1]);
+    rotate(x, 1, 2, 0.25 * h * x[0]);
+    kick(x, 0.5 * h);
+}

@@ -1,0 +1,210 @@
+"""The systems, each given once, by π and H: specs for phigen and vector fields for the others come from here."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import sympy
+
+
+@dataclass(frozen=True)
+class Problem:
+    """A system with its data.
+
+    ``short`` and ``long`` are the horizons, ``largest`` is the largest step tried, ``typical`` the one at which steps
+    are compared; ``splitting`` names the C file with an explicit Poisson splitting, ``constants`` go to it.
+    """
+
+    name: str
+    title: str
+    coordinates: tuple[str, ...]
+    poisson: tuple[tuple[str, ...], ...]
+    hamiltonian: str
+    casimirs: Mapping[str, str]
+    start: tuple[float, ...]
+    orders: tuple[int, ...]
+    short: float = 1e4
+    long: float = 1e6
+    largest: float = 2.0
+    typical: float = 0.1
+    kind: str = "auto"
+    splitting: str = ""
+    quadratic: bool = True
+    gauges: tuple[str, ...] = ("none", "auto")
+    constants: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def dimension(self) -> int:
+        return len(self.coordinates)
+
+    @cached_property
+    def symbols(self) -> list[sympy.Symbol]:
+        return [sympy.Symbol(c, real=True) for c in self.coordinates]
+
+    def parse(self, text: str) -> sympy.Expr:
+        names = dict(zip(self.coordinates, self.symbols, strict=True))
+        return sympy.nsimplify(sympy.sympify(text, locals=names, rational=True))
+
+    @cached_property
+    def field(self) -> list[sympy.Expr]:
+        """The right-hand side, as short as a careful user would write it."""
+        H = self.parse(self.hamiltonian)
+        gradient = sympy.Matrix([sympy.diff(H, s) for s in self.symbols])
+        pi = sympy.Matrix([[self.parse(e) for e in row] for row in self.poisson])
+        return [sympy.factor_terms(sympy.expand(e)) for e in pi * gradient]
+
+    def spec(self, order: int, gauge: str = "none", composition: str = "none") -> str:
+        """A spec of the system, named ``bench``; ``order`` is reached by the series itself unless composed."""
+        rows = "\n".join(f"    - [{', '.join(row)}]" for row in self.poisson)
+        casimirs = "".join(f"  {name}: {text}\n" for name, text in self.casimirs.items())
+        return (
+            f"phigen: 1\nname: bench\ncoordinates: [{', '.join(self.coordinates)}]\n"
+            f"poisson:\n  matrix:\n{rows}\nhamiltonian: {self.hamiltonian}\n"
+            f"{'casimirs:' if casimirs else ''}\n{casimirs}"
+            f"birealisation: {self.kind}\norder: {order}\ngauge: {gauge}\ncomposition: {composition}\n"
+        )
+
+
+_SO3 = (("0", "-x3", "x2"), ("x3", "0", "-x1"), ("-x2", "x1", "0"))
+_SPHERE = {"C": "x1**2 + x2**2 + x3**2"}
+
+
+def _body(name: str, title: str, inverse: tuple[str, str, str], **rest: object) -> Problem:
+    energy = " + ".join(f"{w}*x{i}**2" for i, w in enumerate(inverse, start=1))
+    constants = {f"INVERSE_{i}": float(sympy.Rational(w)) for i, w in enumerate(inverse, start=1)}
+    return Problem(
+        name,
+        title,
+        ("x1", "x2", "x3"),
+        _SO3,
+        f"({energy})/2",
+        _SPHERE,
+        (1.0, 1.0, 1.0),
+        (4, 6, 8, 10, 12, 14),
+        splitting="rigid_body",
+        constants=constants,
+        **rest,  # type: ignore[arg-type]
+    )
+
+
+def _se3() -> tuple[tuple[str, ...], ...]:
+    P, G, zero = ("P1", "P2", "P3"), ("G1", "G2", "G3"), ("0", "0", "0")
+
+    def hat(v: tuple[str, ...]) -> list[tuple[str, ...]]:
+        return [("0", "-" + v[2], v[1]), (v[2], "0", "-" + v[0]), ("-" + v[1], v[0], "0")]
+
+    top, bottom = zip(hat(P), hat(G), strict=True), hat(G)
+    return (*((*a, *b) for a, b in top), *((*a, *zero) for a in bottom))
+
+
+def _so4() -> tuple[tuple[str, ...], ...]:
+    pairs = [(1, 2), (1, 3), (1, 4), (2, 3), (2, 4), (3, 4)]
+    given = {
+        "12": {"13": "-x23", "14": "-x24", "23": "x13", "24": "x14"},
+        "13": {"14": "-x34", "23": "-x12", "34": "x14"},
+        "14": {"24": "-x12", "34": "-x13"},
+        "23": {"24": "-x34", "34": "x24"},
+        "24": {"34": "-x23"},
+    }
+    names = [f"{i}{j}" for i, j in pairs]
+
+    def entry(a: str, b: str) -> str:
+        text = given.get(a, {}).get(b)
+        if text is None:
+            text = given.get(b, {}).get(a, "0")
+            return text if text == "0" else text.removeprefix("-") if text.startswith("-") else "-" + text
+        return text
+
+    return tuple(tuple(entry(a, b) for b in names) for a in names)
+
+
+def volterra(n: int) -> Problem:
+    """The periodic Volterra lattice of n species."""
+    v = [f"v{i}" for i in range(1, n + 1)]
+    rows = [["0"] * n for _ in v]
+    for i in range(n):
+        j = (i + 1) % n
+        rows[i][j], rows[j][i] = f"{v[i]}*{v[j]}", f"-{v[i]}*{v[j]}"
+    start = tuple(1 + 0.5 * float(sympy.sin(2 * i)) for i in range(n))
+    return Problem(
+        f"volterra{n}",
+        f"Volterra lattice, n = {n}",
+        tuple(v),
+        tuple(map(tuple, rows)),
+        " + ".join(v),
+        {},
+        start,
+        (2, 4),
+        typical=0.05,
+    )
+
+
+PROBLEMS = (
+    _body("P1", "Free rigid body, moments 1, 2, 3", ("1", "1/2", "1/3")),
+    _body(
+        "P1stiff",
+        "Free rigid body, stiff",
+        ("103.14159265358979", "101", "4.14159265358979"),
+        short=100.0,
+        long=1e4,
+        largest=0.02,
+        typical=1e-3,
+    ),
+    Problem(
+        "P2",
+        "Bounded Lotka–Volterra system",
+        ("x1", "x2", "x3"),
+        (("0", "x1*x2", "-0.7*x1*x3"), ("-x1*x2", "0", "1.3*x2*x3"), ("0.7*x1*x3", "-1.3*x2*x3", "0")),
+        "x1 + x2 + x3 - log(x1) - log(x2) - log(x3)",
+        {"C": "1.3*log(x1) + 0.7*log(x2) + log(x3)"},
+        (1.5, 0.8, 0.6),
+        (4, 6, 8, 10, 12),
+        largest=1.0,
+        splitting="lotka_volterra",
+        gauges=("none",),
+        constants={"A12": 1.0, "A13": -0.7, "A23": 1.3},
+    ),
+    Problem(
+        "P3",
+        "Kowalevski top",
+        ("P1", "P2", "P3", "G1", "G2", "G3"),
+        _se3(),
+        "(P1**2/2 + P2**2/2 + P3**2)/2 + G1",
+        {"A": "G1**2 + G2**2 + G3**2", "B": "P1*G1 + P2*G2 + P3*G3"},
+        (1.0, 0.5, 0.8, 0.6, 0.0, 0.8),
+        (4, 6, 8, 10),
+        largest=1.0,
+        splitting="kowalevski",
+    ),
+    Problem(
+        "so4",
+        "Manakov's body on so(4)*",
+        ("x12", "x13", "x14", "x23", "x24", "x34"),
+        _so4(),
+        "(x12**2/3 + x13**2/4 + x14**2/5 + x23**2/5 + x24**2/6 + x34**2/7)/2",
+        {
+            "A": "x12**2 + x13**2 + x14**2 + x23**2 + x24**2 + x34**2",
+            "B": "x12*x34 - x13*x24 + x14*x23",
+        },
+        (1.0, 0.5, -1 / 3, 0.25, 2 / 3, -0.2),
+        (4, 6, 8),
+        largest=2.5,
+    ),
+    Problem(
+        "nambu",
+        "Nambu's pendulum, on Karasev's paths",
+        ("theta", "p", "V"),
+        (("0", "1", "0"), ("-1", "0", "-sin(theta)"), ("0", "sin(theta)", "0")),
+        "p**2/2 + V",
+        {"C": "V + cos(theta)"},
+        (0.0, 1.9, 0.0),
+        (4, 6, 8),
+        largest=1.0,
+        kind="karasev",
+        splitting="pendulum",
+        quadratic=False,
+        gauges=("none",),
+    ),
+)

@@ -1,0 +1,273 @@
+"""Compiling: phigen's solvers and the C peers become shared libraries with one function `bench_run` each."""
+
+from __future__ import annotations
+
+import ctypes
+import math
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import mpmath
+import numpy as np
+import sympy
+
+from benchmarks.problems import Problem
+from phigen import spec as specs
+from phigen.analysis.proof import compile_proved
+from phigen.compiler import emit
+from phigen.runtime import cache
+
+C_FILES = Path(__file__).parent / "c"
+STATUSES = {0: "ok", 1: "no convergence", 2: "singular", 3: "not finite", 4: "bad argument", 100: "too slow"}
+
+_HALF = (
+    0.13020248308889008088, 0.56116298177510838456, -0.38947496264484728641, 0.15884190655515560090,
+    -0.39590389413323757734, 0.18453964097831570709, 0.25837438768632204729, 0.29501172360931029887,
+)  # fmt: skip
+#: Kahan and Li's composition of order 8 (17 stages), Math. Comp. 66 (1997) 1089–1099.
+KAHAN_LI = (*_HALF, 1 - 2 * sum(_HALF), *reversed(_HALF))
+
+
+@dataclass(frozen=True)
+class Run:
+    """One integration: the states at the ends of all chunks, what it cost, and how it ended ("ok" or why not)."""
+
+    states: np.ndarray
+    seconds: float
+    steps: int
+    evaluations: float
+    status: str
+
+
+#: start, step, steps of a chunk, chunks, seconds after which to give up
+Runner = Callable[[Sequence[float], float, int, int, float], Run]
+
+
+@dataclass(frozen=True)
+class Method:
+    """``step_based`` methods take a step size; the others (heyoka, scipy) a tolerance in its place."""
+
+    name: str
+    run: Runner
+    order: int
+    family: str = "peer"
+    step_based: bool = True
+    note: str = ""
+
+
+# phigen ------------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Built:
+    """A phigen solver: its library, the seconds that phigen and the C compiler took, its header lines."""
+
+    library: ctypes.CDLL
+    generating: float
+    compiling: float
+    summary: str
+
+
+@lru_cache(maxsize=None)
+def build_phigen(text: str) -> Built:
+    """Raises `PhigenError`s: what phigen refuses is reported, not hidden."""
+    start = time.perf_counter()
+    source = emit(compile_proved(specs.loads(text, "bench.yaml")).program, "c", "", single_file=True)["bench.c"]
+    middle = time.perf_counter()
+    main = (
+        "#define _POSIX_C_SOURCE 199309L\n"
+        '#include "common.h"\n#pragma GCC visibility push(hidden)\n#include "bench.h"\n#pragma GCC visibility pop\n'
+        '#include "run_phigen.h"\n'
+    )
+    library = cache.load({"main.c": main, "bench.h": source, **_texts("common.h", "run_phigen.h")})
+    summary = "; ".join(line[2:].strip() for line in source.splitlines()[3:8] if ":" in line)
+    return Built(library, middle - start, time.perf_counter() - middle, summary)
+
+
+def phigen_method(problem: Problem, order: int, gauge: str, composition: str = "none") -> Method:
+    built = build_phigen(problem.spec(order, gauge, composition))
+    label = f"phigen {order}" + (f", gauge {gauge}" if len(problem.gauges) > 1 else "")
+    return Method(label, _runner(built.library, 0), order, "phigen", note=built.summary)
+
+
+# Peers in C --------------------------------------------------------------------------------------------------------
+
+
+def peer_names(problem: Problem) -> dict[str, tuple[str, int]]:
+    """The C functions of all peers that apply, with their titles and orders."""
+    names = {
+        "rk4": ("RK4 in C", 4),
+        "dop853": ("DOP853 in C", 8),
+        "gauss1": ("implicit midpoint in C", 2),
+        "gauss3": ("Gauss 6 in C", 6),
+    }
+    if problem.quadratic:
+        names |= {"kahan": ("Kahan in C", 2), "kahan_kl8": ("Kahan, Kahan–Li 8, in C", 8)}
+    if problem.splitting:
+        names |= {"splitting": ("Poisson splitting in C", 2), "splitting_kl8": ("splitting, Kahan–Li 8, in C", 8)}
+    return names
+
+
+def c_peers(problem: Problem) -> list[Method]:
+    names = peer_names(problem)
+    library = cache.load({"main.c": _peer_source(problem, list(names)), **_texts()})
+    return [Method(title, _runner(library, i), order) for i, (title, order) in enumerate(names.values())]
+
+
+def reference(problem: Problem, horizon: float, chunks: int) -> tuple[np.ndarray, float]:
+    """States at the ends of the chunks by Gauss' method of order 16 in long double, and their uncertainty."""
+    library = cache.load({"main.c": _reference_source(problem), **_texts()})
+    run = _runner(library, 0)
+    chunk = math.ceil(horizon / chunks / problem.typical)
+    coarse, fine = (
+        run(problem.start, horizon / chunks / steps, steps, chunks, math.inf) for steps in (chunk, chunk + chunk // 3)
+    )
+    return fine.states, float(np.abs(fine.states - coarse.states).max())
+
+
+def vector_rk4(problem: Problem, width: int = 8) -> ctypes.CDLL:
+    """RK4 for ensembles, ``width`` members at once (polynomial fields only)."""
+    main = "\n".join(
+        [
+            f"#define _POSIX_C_SOURCE 199309L\n#define WIDTH {width}",
+            f"typedef double lanes __attribute__((vector_size({8 * width})));\n#define REAL lanes",
+            '#include "common.h"',
+            _field_source(problem, jacobian=False),
+            _tables(("rk4", "dop853")),
+            '#include "runge_kutta.h"\n#include "run_ensemble.h"\n',
+        ]
+    )
+    return cache.load({"main.c": main, **_texts()})
+
+
+def _peer_source(problem: Problem, names: Sequence[str]) -> str:
+    parts = [
+        "#define _POSIX_C_SOURCE 199309L\n#define ROUNDING 1.5e-16",
+        '#include "common.h"',
+        _field_source(problem, jacobian=problem.quadratic),
+        _tables(("rk4", "dop853", "gauss1", "gauss3")),
+        _array("kahan_li8", KAHAN_LI),
+        '#include "runge_kutta.h"\n#include "gauss.h"\n#include "compose.h"\nGAUSS(gauss1, 1)\nGAUSS(gauss3, 3)',
+    ]
+    if problem.quadratic:
+        parts.append('#include "kahan.h"')
+    if problem.splitting:
+        parts += [f"#define {name} ({value!r})" for name, value in problem.constants.items()]
+        parts.append(f'#include "elementary.h"\n#include "splitting_{problem.splitting}.h"')
+        parts.append("COMPOSE(splitting, splitting_step, whole_step)\nCOMPOSE(splitting_kl8, splitting_step, kahan_li8)")
+    parts.append(f"static void (*const methods[])(real *, double, long) = {{ {', '.join(names)} }};")
+    return "\n".join([*parts, '#include "run_peers.h"\n'])
+
+
+def _reference_source(problem: Problem) -> str:
+    return "\n".join(
+        [
+            "#define _POSIX_C_SOURCE 199309L\n#include <tgmath.h>\n#define REAL long double\n#define ROUNDING 1e-19L",
+            '#include "common.h"',
+            _field_source(problem, jacobian=False),
+            _tables(("gauss8",)),
+            '#include "gauss.h"\nGAUSS(gauss8, 8)',
+            "static void (*const methods[])(real *, double, long) = { gauss8 };",
+            '#include "run_peers.h"\n',
+        ]
+    )
+
+
+def _field_source(problem: Problem, *, jacobian: bool) -> str:
+    """`field`, and `jacobian` for Kahan's method, with common subexpressions computed once."""
+    x = "\n".join(f"    const real {c} = x[{i}];" for i, c in enumerate(problem.coordinates))
+    lines = [f"#define DIM {problem.dimension}", "INLINE void field(const real x[DIM], real f[DIM])\n{", x]
+    lines += [*_assignments(problem.field, [f"f[{i}]" for i in range(problem.dimension)]), "}"]
+    if jacobian:
+        entries = sympy.Matrix(problem.field).jacobian(problem.symbols)
+        targets = [f"J[{i}][{j}]" for i in range(problem.dimension) for j in range(problem.dimension)]
+        lines += ["INLINE void jacobian(const real x[DIM], real J[DIM][DIM])\n{", x]
+        lines += [*_assignments([sympy.factor_terms(e) for e in entries], targets), "}"]
+    return "\n".join(lines)
+
+
+def _assignments(expressions: Sequence[sympy.Expr], targets: Sequence[str]) -> list[str]:
+    shared, left = sympy.cse(expressions, symbols=sympy.numbered_symbols("t"))
+    code = [f"    const real {name} = {sympy.ccode(value)};" for name, value in shared]
+    zero = "0 * x[0]" if not all(left) else "0"  # a vector where real is one
+    return [*code, *(f"    {t} = {sympy.ccode(e) if e != 0 else zero};" for t, e in zip(targets, left, strict=True))]
+
+
+def _tables(names: Sequence[str]) -> str:
+    tables = {"rk4": _rk4, "dop853": _dop853}
+    lines = ["#define MOST_STAGES 16"]
+    for name in names:
+        if name in tables:
+            a, b = tables[name]()
+            lines += [_array(f"{name}_a", a.ravel()), _array(f"{name}_b", b)]
+        else:
+            for part, values in _gauss(int(name.removeprefix("gauss"))).items():
+                lines.append(f"static const real {name}_{part}[] = {{ {', '.join(values)} }};")
+    return "\n".join(lines)
+
+
+def _rk4() -> tuple[np.ndarray, np.ndarray]:
+    a = np.zeros((4, 4))
+    a[1, 0] = a[2, 1] = 0.5
+    a[3, 2] = 1.0
+    return a, np.array([1, 2, 2, 1]) / 6
+
+
+def _dop853() -> tuple[np.ndarray, np.ndarray]:
+    from scipy.integrate._ivp import dop853_coefficients as table
+
+    return table.A[:12, :12], table.B
+
+
+def _gauss(stages: int) -> dict[str, list[str]]:
+    """Gauss' method in 25 digits, and the extrapolation of its collocation polynomial to the next step."""
+    with mpmath.workdps(40):
+        t = sympy.Symbol("t")
+        shifted = sympy.Poly(sympy.legendre(stages, 2 * t - 1), t)
+        roots = mpmath.polyroots([mpmath.mpf(c.p) / c.q for c in shifted.all_coeffs()], maxsteps=200, extraprec=200)
+        c = sorted(mpmath.re(r) for r in roots)
+
+        def basis(j: int, s: Any) -> Any:
+            return mpmath.fprod((s - c[m]) / (c[j] - c[m]) for m in range(stages) if m != j)
+
+        def integral(j: int, end: Any) -> Any:
+            return mpmath.quad(lambda s: basis(j, s), [0, end])
+
+        parts = {
+            "a": [integral(j, ci) for ci in c for j in range(stages)],
+            "b": [integral(j, 1) for j in range(stages)],
+            "extrapolation": [basis(j, 1 + ci) for ci in c for j in range(stages)],
+        }
+        return {name: [mpmath.nstr(v, 25, strip_zeros=False) + "L" for v in part] for name, part in parts.items()}
+
+
+def _array(name: str, values: Sequence[float] | np.ndarray) -> str:
+    return f"static const double {name}[] = {{ {', '.join(repr(float(v)) for v in values)} }};"
+
+
+def _texts(*names: str) -> dict[str, str]:
+    files = [C_FILES / n for n in names] or sorted(C_FILES.glob("*.h"))
+    return {f.name: f.read_text(encoding="utf-8") for f in files}
+
+
+def _runner(library: ctypes.CDLL, index: int) -> Runner:
+    function = library.bench_run
+    function.restype = ctypes.c_int
+    double, pointer, long = ctypes.c_double, ctypes.c_void_p, ctypes.c_long
+    function.argtypes = (ctypes.c_int, pointer, double, long, long, double, pointer, pointer, pointer)
+
+    def run(start: Sequence[float], h: float, chunk: int, chunks: int, limit: float) -> Run:
+        x0 = np.array(start, dtype=np.float64)
+        states = np.full((chunks, len(x0)), np.nan)
+        seconds, evaluations = np.zeros(1), np.zeros(1)
+        status = function(
+            index, x0.ctypes.data, h, chunk, chunks, min(limit, 1e9),
+            states.ctypes.data, seconds.ctypes.data, evaluations.ctypes.data,
+        )  # fmt: skip
+        return Run(states, float(seconds[0]), chunk * chunks, float(evaluations[0]), STATUSES.get(status, str(status)))
+
+    return run
