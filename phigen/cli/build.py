@@ -5,7 +5,7 @@ from __future__ import annotations
 import shlex
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,7 +13,7 @@ import click
 
 from phigen.cli.console import Console, out, pass_console, verbosity
 from phigen.cli.failures import Collector
-from phigen.cli.sources import ORDER, load_all, many_specs
+from phigen.cli.sources import CORRECTIONS, ORDER, load_all, many_specs
 from phigen.errors import CheckError
 
 if TYPE_CHECKING:
@@ -36,10 +36,14 @@ class Options:
     order: int | None = None
     single_file: bool = False
     tangent: bool = False
+    modified: int | None = None
 
     def extras_of(self, spec: Spec) -> Extras:
         """What the code offers beyond the solver: what the spec asks for, and the command line."""
-        return replace(spec.extras, tangent=True) if self.tangent else spec.extras
+        from phigen.spec.model import Extras
+
+        tangent = self.tangent or spec.extras.tangent
+        return Extras(tangent, spec.extras.modified_hamiltonian if self.modified is None else self.modified)
 
     def targets_of(self, compilation: Compilation) -> tuple[str, ...]:
         """The targets to write: those of the command line, else those of the spec."""
@@ -54,6 +58,7 @@ class Options:
         words += ["--order", str(self.order)] if self.order else []
         words += ["--single-file"] if self.single_file else []
         words += ["--tangent"] if self.tangent else []
+        words += ["--modified", str(self.modified)] if self.modified is not None else []
         return shlex.join(words)
 
 
@@ -66,6 +71,7 @@ class Options:
 @click.option("--order", type=ORDER, help="Order of the method, instead of the spec's.")
 @click.option("--single-file", is_flag=True, help="C in one file, NAME.c, without a header.")
 @click.option("--tangent", is_flag=True, help="Generate step_tangent, the derivative of a step, too.")
+@click.option("--modified", type=CORRECTIONS, metavar="N", help="Generate modified_hamiltonian, N corrections, too.")
 @click.option("--compile", "compiling", is_flag=True, help="Compile the C too, to DIR/NAME/libNAME.so.")
 @click.option(
     "--check", "checking", is_flag=True, help="Write nothing; fail if a file differs from what belongs there."
@@ -82,6 +88,7 @@ def command(
     order: int | None,
     single_file: bool,
     tangent: bool,
+    modified: int | None,
     compiling: bool,
     checking: bool,
     diff: bool,
@@ -94,7 +101,7 @@ def command(
     """
     if (checking or diff) and compiling:
         raise click.UsageError("--compile writes a library; --check and --diff write nothing")
-    options = Options(Path(output), tuple(dict.fromkeys(targets)), order, single_file, tangent)
+    options = Options(Path(output), tuple(dict.fromkeys(targets)), order, single_file, tangent, modified)
     compilations = _compile_all(console, spec_files, options)
     planned = _plan(console, compilations, options)
     if checking or diff:
@@ -148,6 +155,7 @@ def generate(compilation: Compilation, target: str, options: Options) -> dict[st
     words += ["--order", str(options.order)] if options.order not in (None, spec.order) else []
     words += ["--single-file"] if single else []
     words += ["--tangent"] if options.tangent and not spec.extras.tangent else []
+    words += ["--modified", str(options.modified)] if options.modified is not None else []
     return emit(compilation.program, target, " ".join(words), single_file=single)
 
 

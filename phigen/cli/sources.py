@@ -21,6 +21,9 @@ SUFFIXES = (".yaml", ".yml")
 #: The type of ``--order``.
 ORDER = click.IntRange(1, limits.ORDER)
 
+#: The type of ``--modified``.
+CORRECTIONS = click.IntRange(0, limits.CORRECTIONS)
+
 one_spec = click.argument("spec_file", metavar="SPEC", type=click.Path())
 many_specs = click.argument("spec_files", metavar="SPEC...", nargs=-1, required=True, type=click.Path())
 

@@ -11,6 +11,7 @@ from phigen.scheme.gauge import kernels as gauge_kernels
 from phigen.scheme.generating import STEP
 from phigen.scheme.kernels import observables, path_kernels, step_kernels
 from phigen.scheme.lowering import cost, operation_counts
+from phigen.scheme.modified import modified_kernel
 from phigen.scheme.order import Order
 from phigen.scheme.path import build_path
 from phigen.scheme.program import Kernel, Output, Program
@@ -50,6 +51,9 @@ def build_program(
         kernels = step_kernels(system, realisation, generating, coefficients)
     if extras.tangent:
         kernels |= tangent_kernels(system, kernels, generating, coefficients)
+    if extras.modified_hamiltonian:
+        count, stages = extras.modified_hamiltonian, len(scheme.fractions)
+        kernels["modified"] = modified_kernel(system, realisation, order, gauge, count, stages)
     varied = tangent_path(system, coefficients) if path and extras.tangent else None
     driver = "path" if path else "explicit" if "explicit" in kernels else "newton"
     kernels |= observables(system) | gauge_kernels(system, realisation, gauge)
@@ -60,7 +64,7 @@ def build_program(
         (Output("coef", tuple(coefficients.values)),),
     )
     main = kernels[{"path": "generate", "newton": "linearise"}.get(driver, driver)]
-    for kernel in (prepare, main):
+    for kernel in (prepare, main, *(kernels[k] for k in ("modified",) if k in kernels)):
         _within_budget(kernel, system)
     facts = [
         f"bi-realisation: {realisation.kind}, {'symmetric' if realisation.symmetric else 'not symmetric'}",

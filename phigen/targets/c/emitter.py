@@ -181,6 +181,8 @@ def _body(program: Program) -> str:
         pieces.append(_render("choose_gauge.c", values))
     if program.extras.tangent:
         pieces += extras.tangent(program, values, _path_syntax(program))
+    if "modified" in kernels:
+        pieces += extras.modified(program, values)
     pieces += [_render("api.c", values), static("energy"), exported("casimirs"), exported("vector_field")]
     if any(apart(program) in piece for piece in pieces):
         pieces.insert(1, _render("apart.c", values))

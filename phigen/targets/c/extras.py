@@ -1,4 +1,4 @@
-"""What the C code offers on request: the tangent map of a step."""
+"""What the C code offers on request: the tangent map of a step, the modified Hamiltonian."""
 
 from __future__ import annotations
 
@@ -21,7 +21,41 @@ def declarations(program: Program) -> list[str]:
             *_step_tangent(program)[:-1],
             _step_tangent(program)[-1] + ";\n",
         ]
+    if "modified" in program.kernels:
+        signature = _modified(program)
+        lines += [
+            "/* The Hamiltonian whose flow a step of size h is, up to O(h^"
+            + str(modified_power(program))
+            + "); constant",
+            "   along a trajectory to that order. */",
+            *signature[:-1],
+            signature[-1] + ";\n",
+        ]
     return lines
+
+
+def modified_power(program: Program) -> int:
+    """The first power of h that the modified Hamiltonian leaves out."""
+    return program.order + (2 if program.symmetric else 1) * program.extras.modified_hamiltonian
+
+
+def _modified(program: Program) -> list[str]:
+    name = program.name
+    arguments = [f"const {name}_params *params"]
+    arguments += [f"const double gauge[{len(program.gauge)}]"] if program.gauge else []
+    arguments += ["double h", f"const double x[{program.dimension}]"]
+    return wrapped_arguments(f"double {name}_modified_hamiltonian(", arguments)
+
+
+def modified(program: Program, values: Mapping[str, object]) -> list[str]:
+    """The function of the modified Hamiltonian."""
+    params = f"params != NULL ? params : &{program.name}_default_params"
+    own = {
+        **values,
+        "modified_signature": "\n".join(_modified(program)),
+        "modified_arguments": ", ".join([params, *(["gauge"] if program.gauge else []), "h", "x"]),
+    }
+    return [function(program, program.kernels["modified"]) + "\n", render("c", "modified.c", own)]
 
 
 def _step_tangent(program: Program) -> list[str]:

@@ -74,6 +74,9 @@ def emit(program: Program, command: str) -> dict[str, str]:
     pieces += [render("numpy", "observables.py", _values(program))]
     if program.extras.tangent:
         pieces += _tangent(program)
+    if "modified" in kernels:
+        order = program.order + (2 if program.symmetric else 1) * program.extras.modified_hamiltonian
+        pieces += [_function(program, kernels["modified"]), render("numpy", "modified.py", {"modified_power": order})]
     body = "\n\n".join(p.strip("\n") + "\n" for p in pieces)
     comment = "\n".join(f"# {line}".rstrip() for line in header_lines(program, command))
     return {f"{program.name}.py": f"{comment}\n# {CHECKSUM} {checksum(body)}\n{body}"}
@@ -163,7 +166,7 @@ def _result(program: Program, kernel: Kernel, code: Code, printer: Printer) -> s
         values[s.array].append(s.value)
     if kernel.name == "prepare":
         return "    return " + _list([printer(v) for v in values["coef"]])
-    state = next(a for a in kernel.inputs if a not in ("coef", "params", "gauge"))
+    state = next(a for a in kernel.inputs if a not in ("coef", "params", "gauge", "h"))
     n = program.dimension
     arrays = []
     for name, entries in values.items():

@@ -1,0 +1,71 @@
+"""The modified Hamiltonian of a program's step, as a kernel and for reading."""
+
+from __future__ import annotations
+
+from phigen.errors import Diagnostic, SpecError
+from phigen.geometry.system import System
+from phigen.realisations.protocol import BiRealisation
+from phigen.scheme.discretisation import formal_alpha, too_large
+from phigen.scheme.gauge import Gauge
+from phigen.scheme.generating import STEP
+from phigen.scheme.order import Order
+from phigen.scheme.program import Kernel, Output
+from phigen.series.modified import ModifiedSeries, modified_series
+from phigen.symbolic.expression import Expression
+
+
+def powers(order: Order, count: int, *, symmetric: bool) -> list[int]:
+    """The powers of h of the first ``count`` corrections: order, order + 1, …, or every second if symmetric."""
+    return [order.order + (2 if symmetric else 1) * k for k in range(count)]
+
+
+def corrections(
+    system: System, realisation: BiRealisation, order: Order, count: int, gauge: Gauge | None = None
+) -> ModifiedSeries:
+    """H_0, H_1, … of H − Σ λC with ``count`` corrections, in a tower that contains the step size.
+
+    Raises `LimitError` if a correction is too large.
+    """
+    gauge = gauge or Gauge()
+    gauged = gauge.applied(system)
+    power = powers(order, count, symmetric=realisation.symmetric)[-1] if count else 0
+    try:
+        return modified_series(
+            gauged.hamiltonian,
+            formal_alpha(gauged, realisation, power + 1),
+            system.coordinates,
+            [*system.parameter_names, *gauge.symbols, STEP],
+            order.terms,
+            power,
+            symmetric=realisation.symmetric,
+        )
+    except (OverflowError, ValueError) as error:
+        raise too_large(system, f"the modified Hamiltonian with {count} corrections is too large: {error}") from None
+
+
+def modified_hamiltonian(
+    system: System, realisation: BiRealisation, order: Order, count: int, gauge: Gauge | None = None
+) -> Expression:
+    """H̃_h as one expression in coordinates, parameters, gauge and step size."""
+    found = corrections(system, realisation, order, count, gauge)
+    h = found.tower.variable(STEP)
+    summed = found.tower.expression(found.tower.combine([t * h**j for j, t in enumerate(found.terms)]))
+    taken = system.hamiltonian - (gauge or Gauge()).applied(system).hamiltonian
+    return summed + taken
+
+
+def modified_kernel(
+    system: System, realisation: BiRealisation, order: Order, gauge: Gauge, count: int, stages: int
+) -> Kernel:
+    """The kernel ``modified``. Raises `SpecError` for compositions and approximate bi-realisations, which have none."""
+    if stages > 1 or not realisation.exact:
+        why = "a composition" if stages > 1 else "an approximate bi-realisation"
+        place = system.locations.get(("modified_hamiltonian",))
+        raise SpecError([Diagnostic(f"modified_hamiltonian is not offered for {why}", place)])
+    value = modified_hamiltonian(system, realisation, order, count, gauge)
+    return Kernel(
+        "modified",
+        f"the Hamiltonian whose flow the step is, with {count} corrections",
+        {"params": system.parameter_names, **gauge.inputs, "h": (STEP,), "x": system.coordinates},
+        (Output("energy", (value,)),),
+    )
