@@ -73,6 +73,16 @@ def test_casimirs_do_not_drift_in_100_000_steps(name):
     assert worst <= 1e-13
 
 
+@pytest.mark.parametrize("h", [0.5, 2.0, 5.0])
+def test_no_path_crosses_the_boundary_of_its_leaf(h):
+    # S I = 0 on the faces of the simplex: no step can make a fraction negative, not even a coarse one.
+    compilation, at = by_paths("sir_epidemic"), steady("sir_epidemic")
+    trajectory = solver(compilation, "c").integrate((0.99, 0.01, 0.0), h=h, steps=400, parameters=at.parameters)
+    assert np.min(trajectory.x[:, :2]) > 0
+    assert np.min(trajectory.x[-1, 1]) < 1e-11
+    assert np.max(np.abs(trajectory.x.sum(axis=1) - 1)) < 1e-14
+
+
 @pytest.mark.parametrize("target", TARGETS)
 @pytest.mark.parametrize("name", ["charged_particle", "sklyanin_gyrostat", "sir_epidemic", "guiding_centre"])
 def test_step_back_undoes_step(name, target):
