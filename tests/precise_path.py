@@ -33,7 +33,7 @@ def by_paths(name: str, order: int | None = None) -> Compilation:
 
 def with_paths(given: spec.Spec, order: int | None = None, composition: str = "auto") -> Compilation:
     """A spec compiled with the bi-realisation karasev."""
-    chosen = replace(given, birealisation=BirealisationChoice("karasev"), composition=composition)
+    chosen = replace(given, birealisation=BirealisationChoice("karasev"), composition=composition, gauge="none")
     return compile_spec(chosen, order=order)
 
 

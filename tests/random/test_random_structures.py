@@ -11,11 +11,10 @@ import numpy as np
 import pytest
 from precise_path import PrecisePathStep, PreciseSystem, flow_at_one, state_of
 from random_structures import KINDS, draw
-from support import TARGETS, PreciseStep, RawC, solver, values
+from support import TARGETS, PreciseStep, RawC, compile_text, solver, values
 
 from phigen import spec
 from phigen.analysis.proof import examine
-from phigen.compiler import compile_spec
 from phigen.symbolic.verdict import CHECKED, PROVED
 
 EPS = np.finfo(float).eps
