@@ -128,7 +128,9 @@ class Expression:
 
 
 def _node(op: str, args: tuple[Expression, ...] = (), value: Any = None) -> Expression:
-    key = (op, value, *map(id, args))
+    # Plain integers: the keys of dying nodes are compared at interpreter exit, when Fraction no longer can be.
+    plain = (value.numerator, value.denominator) if isinstance(value, Fraction) else value
+    key = (op, plain, *map(id, args))
     found = _NODES.get(key)
     if found is not None:
         return found
