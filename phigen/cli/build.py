@@ -73,6 +73,7 @@ class Options:
 @click.option("--tangent", is_flag=True, help="Generate step_tangent, the derivative of a step, too.")
 @click.option("--modified", type=CORRECTIONS, metavar="N", help="Generate modified_hamiltonian, N corrections, too.")
 @click.option("--compile", "compiling", is_flag=True, help="Compile the C too, to DIR/NAME/libNAME.so.")
+@click.option("--certify", is_flag=True, help="Verify too, and write DIR/NAME/NAME.certificate.json.")
 @click.option(
     "--check", "checking", is_flag=True, help="Write nothing; fail if a file differs from what belongs there."
 )
@@ -90,6 +91,7 @@ def command(
     tangent: bool,
     modified: int | None,
     compiling: bool,
+    certify: bool,
     checking: bool,
     diff: bool,
     force: bool,
@@ -99,17 +101,20 @@ def command(
     SPEC is a file, or a folder that is searched for *.yaml. What the spec claims is proved first; nothing is
     written if there is an error in any spec. Files that were edited by hand are not overwritten.
     """
-    if (checking or diff) and compiling:
-        raise click.UsageError("--compile writes a library; --check and --diff write nothing")
+    if (checking or diff) and (compiling or certify):
+        raise click.UsageError("--compile and --certify write files; --check and --diff write nothing")
     options = Options(Path(output), tuple(dict.fromkeys(targets)), order, single_file, tangent, modified)
     compilations = _compile_all(console, spec_files, options)
     planned = _plan(console, compilations, options)
     if checking or diff:
         lone = _orphans(spec_files, compilations, options)
         _compare([*(c for _, changes in planned for c in changes), *lone], options.command(spec_files), diff)
+        _expect_certificates(planned, options)
         console.note(f"{_counted(len(planned), 'system')} up to date in {options.directory}")
         return
     _write(console, planned, options, force, compiling)
+    if certify:
+        _certify(console, compilations, options)
 
 
 def _compile_all(console: Console, spec_files: Sequence[str], options: Options) -> list[Compilation]:
@@ -137,9 +142,7 @@ def _plan(
     result = []
     for compilation in compilations:
         name, start = compilation.spec.name, time.perf_counter()
-        files: dict[str, str] = {}
-        for target in options.targets_of(compilation):
-            files |= generate(compilation, target, options)
+        files = _files(compilation, options)
         console.detail(f"{name}: {time.perf_counter() - start:.2f} s emitting")
         result.append((compilation, changes(options.directory / name, name, files, options.targets or SUFFIXES)))
     return result
@@ -219,6 +222,51 @@ def _write(
         for compilation, _ in planned:
             if "c" in options.targets_of(compilation):
                 _compile_library(console, options.directory / compilation.spec.name, compilation.spec.name)
+
+
+def _certify(console: Console, compilations: Sequence[Compilation], options: Options) -> None:
+    """Verify what was written; systems that fall short get no certificate, and lose the one they had."""
+    from phigen.analysis.proof import compile_proved
+    from phigen.cli import certificate
+    from phigen.cli.outputs import write
+    from phigen.cli.verify import fallen_short, verified, with_tangent
+
+    collector = Collector()
+    for compilation in compilations:
+        spec, path = (
+            compilation.spec,
+            certificate.path_of(options.directory / compilation.spec.name, compilation.spec.name),
+        )
+        with collector.collecting():
+            path.unlink(missing_ok=True)
+            subject = compile_proved(spec, order=options.order, extras=with_tangent(spec))
+            verification = verified(subject, None, False, console, options.targets_of(compilation))
+            if verification.failures:
+                raise fallen_short(verification)
+            write(path, certificate.text_of(compilation, _files(compilation, options), verification))
+            console.note(f"wrote {path}: {len(verification.checks)} measurements")
+    collector.finish()
+
+
+def _expect_certificates(planned: Sequence[tuple[Compilation, list[Change]]], options: Options) -> None:
+    """Raise CheckError for a certificate that is there and about other files; there need not be one."""
+    from phigen.cli import certificate
+
+    found = []
+    for compilation, _ in planned:
+        path = certificate.path_of(options.directory / compilation.spec.name, compilation.spec.name)
+        found.append(certificate.obsolete(path, compilation, _files(compilation, options)))
+    if any(found):
+        lines = ["certificates out of date", *_indented([f for f in found if f])]
+        raise CheckError("\n".join([*lines, "  hint: build with --certify, or remove them"]))
+
+
+def _files(compilation: Compilation, options: Options) -> dict[str, str]:
+    """All files of a compilation."""
+    files: dict[str, str] = {}
+    for target in options.targets_of(compilation):
+        files |= generate(compilation, target, options)
+    return files
 
 
 def _report(console: Console, folder: Path, compilation: Compilation, changes: Sequence[Change]) -> None:

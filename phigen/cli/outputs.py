@@ -82,10 +82,11 @@ def apply(planned: Iterable[Change]) -> None:
         if change.after is None:
             change.path.unlink(missing_ok=True)
         elif change.state != "unchanged":
-            _write(change.path, change.after)
+            write(change.path, change.after)
 
 
-def _write(path: Path, text: str) -> None:
+def write(path: Path, text: str) -> None:
+    """Replace a file as a whole."""
     path.parent.mkdir(parents=True, exist_ok=True)
     handle, temporary = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
     try:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from phigen.cli.console import heading, out, verbosity
-from phigen.cli.sources import ORDER, load_one, one_spec
+from phigen.cli.sources import CORRECTIONS, ORDER, load_one, one_spec
 
 if TYPE_CHECKING:
     from phigen.analysis.formulas import Formula
@@ -24,10 +24,11 @@ _MODIFIED_UP_TO = 6
 @one_spec
 @click.option("--order", type=ORDER, help="Order of the method, instead of the spec's.")
 @click.option("--full", is_flag=True, help="All terms of long formulas.")
+@click.option("--modified", type=CORRECTIONS, default=0, help="So many corrections of the modified Hamiltonian.")
 @click.option("--latex", "as_latex", is_flag=True, help="The formulas as LaTeX, ready for \\input.")
 @click.option("--json", "as_json", is_flag=True, help="For machines: one object of texts.")
 @verbosity
-def command(spec_file: str, order: int | None, full: bool, as_latex: bool, as_json: bool) -> None:
+def command(spec_file: str, order: int | None, full: bool, modified: int, as_latex: bool, as_json: bool) -> None:
     """Show the formulas of a spec: π, Casimirs, α, β, S_1 … S_k, the modified Hamiltonian, operation counts."""
     from phigen.analysis.formulas import SHOWN
     from phigen.api import compilation_of
@@ -40,9 +41,14 @@ def command(spec_file: str, order: int | None, full: bool, as_latex: bool, as_js
 
         out(document(compilation, full=full))
     elif as_json:
-        out(json.dumps(_described(compilation), indent=2, ensure_ascii=False))
+        corrections = {"corrections": dict(modified_formulas(compilation, modified, None))} if modified else {}
+        out(json.dumps({**_described(compilation), **corrections}, indent=2, ensure_ascii=False))
     else:
         _print(compilation, None if full else SHOWN)
+        if modified:
+            _section(
+                "Modified Hamiltonian", _assignments(modified_formulas(compilation, modified, None if full else SHOWN))
+            )
 
 
 def _print(compilation: Compilation, most: int | None) -> None:
@@ -136,6 +142,23 @@ def series_formulas(compilation: Compilation, most: int | None) -> tuple[list[tu
     series = compilation.series(plan.order + 1 if more else plan.terms)
     listed = [(i, of_polynomial(series.tower, s, most)) for i, s in enumerate(series.terms[: plan.terms], 1) if s != 0]
     return listed, of_polynomial(series.tower, -series.terms[plan.order], most) if more else None
+
+
+def modified_formulas(compilation: Compilation, count: int, most: int | None) -> list[tuple[str, str]]:
+    """H̃ = H + h^p H_p + …, and its first corrections; a gauge is that of the section before.
+
+    Raises `SpecError` for a composition and for an approximate bi-realisation.
+    """
+    from phigen.analysis.formulas import of_polynomial
+    from phigen.scheme.modified import corrections, expect_modified, powers
+
+    program, realisation = compilation.program, compilation.realisation
+    expect_modified(compilation.system, realisation, len(program.fractions))
+    found = corrections(compilation.system, realisation, compilation.order, count, compilation.gauge)
+    listed = powers(compilation.order, count, symmetric=realisation.symmetric)
+    names = ["H", *(f"h^{j} H_{j}" if j > 1 else "h H_1" for j in listed), "…"]
+    terms = [(f"H_{j}", str(of_polynomial(found.tower, found.terms[j], most))) for j in listed]
+    return [("H̃", " + ".join(names)), *terms]
 
 
 def _series(compilation: Compilation, most: int | None) -> list[tuple[str, str]]:

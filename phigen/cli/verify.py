@@ -64,8 +64,10 @@ def with_tangent(spec: Spec) -> Any:
     return replace(spec.extras, tangent=True)
 
 
-def verified(compilation: Compilation, name: str | None, quick: bool, console: Console) -> Verification:
-    """The verification of a compilation with its tangent map on a run of its spec."""
+def verified(
+    compilation: Compilation, name: str | None, quick: bool, console: Console, targets: Sequence[str] = ()
+) -> Verification:
+    """The verification of a compilation with its tangent map on a run of its spec; of the spec's targets by default."""
     from phigen.analysis.verification import verify
     from phigen.api import solver_of
     from phigen.cli.run import prepared
@@ -73,7 +75,8 @@ def verified(compilation: Compilation, name: str | None, quick: bool, console: C
     spec = compilation.spec
     experiment = prepared(spec, name)
     run = experiment.run
-    solvers = {target: solver_of(compilation, target) for target in spec.targets}
+    solvers = {target: solver_of(compilation, target) for target in targets or spec.targets}
+    console.detail(f"{spec.name}: built {', '.join(solvers)}")
     return verify(
         compilation, solvers, run.name, experiment.initial, experiment.parameters, float(run.step), run.steps,
         run.compare or ("rk4",), quick=quick,

@@ -54,14 +54,19 @@ def modified_hamiltonian(
     return summed + taken
 
 
-def modified_kernel(
-    system: System, realisation: BiRealisation, order: Order, gauge: Gauge, count: int, stages: int
-) -> Kernel:
-    """The kernel ``modified``. Raises `SpecError` for compositions and approximate bi-realisations, which have none."""
+def expect_modified(system: System, realisation: BiRealisation, stages: int) -> None:
+    """Raise `SpecError` for compositions and approximate bi-realisations, for which it is not computed."""
     if stages > 1 or not realisation.exact:
         why = "a composition" if stages > 1 else "an approximate bi-realisation"
         place = system.locations.get(("modified_hamiltonian",))
         raise SpecError([Diagnostic(f"modified_hamiltonian is not offered for {why}", place)])
+
+
+def modified_kernel(
+    system: System, realisation: BiRealisation, order: Order, gauge: Gauge, count: int, stages: int
+) -> Kernel:
+    """The kernel ``modified``. Raises `SpecError` where `expect_modified` does."""
+    expect_modified(system, realisation, stages)
     value = modified_hamiltonian(system, realisation, order, count, gauge)
     return Kernel(
         "modified",

@@ -1,0 +1,52 @@
+"""Certificates: what `phigen verify` found, tied to the spec and to the files of one build by their hashes."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from phigen._version import __version__
+from phigen.targets.header import split
+
+if TYPE_CHECKING:
+    from phigen.analysis.verification import Verification
+    from phigen.compiler import Compilation
+
+
+def path_of(folder: Path, name: str) -> Path:
+    """Where the certificate of a system is."""
+    return folder / f"{name}.certificate.json"
+
+
+def identity(compilation: Compilation, files: Mapping[str, str]) -> dict[str, Any]:
+    """What a certificate is about: the version, the spec, and the checksum of the body of each file."""
+    return {
+        "phigen": __version__,
+        "name": compilation.spec.name,
+        "spec_sha256": compilation.spec.source_sha256,
+        "files": {name: split(text)[0] for name, text in sorted(files.items())},
+    }
+
+
+def text_of(compilation: Compilation, files: Mapping[str, str], verification: Verification) -> str:
+    """The certificate; apart from measured numbers it depends on spec and version alone."""
+    from phigen.cli.verify import described
+
+    data = {**identity(compilation, files), "verification": described(verification)}
+    return json.dumps(data, indent=2, ensure_ascii=False) + "\n"
+
+
+def obsolete(path: Path, compilation: Compilation, files: Mapping[str, str]) -> str:
+    """Why a certificate on disk is not about these files; empty if it is, or if there is none."""
+    try:
+        data = json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        return ""
+    except (OSError, ValueError):
+        return f"{path} cannot be read"
+    wanted = identity(compilation, files)
+    if not isinstance(data, dict) or any(data.get(key) != value for key, value in wanted.items()):
+        return f"{path} certifies other files"
+    return ""
