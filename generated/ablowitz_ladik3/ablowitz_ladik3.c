@@ -6,7 +6,7 @@
  *   generating function: S_1 (collected polynomial, 9 terms)
  *   step: implicit in p, each path followed by its Taylor series to round-off
  *   composition: suzuki, 5 stages of order 2
- *   one evaluation of the equation for p: 39 additions, 90 multiplications, 6 divisions
+ *   one evaluation of the equation for p: 39 additions, 90 multiplications, 3 divisions
  *
  * spec: ablowitz_ladik3, sha256 a19d6edf1db5d8f1f730a954b05596f3772fa764597865f240bd9a4588aef6f0
  * to regenerate: phigen build ablowitz_ladik3.yaml
@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: a9191b1b5681bf75c40bc9b201a4286a40b5fbebc0c2759f723f9e3d8c569fb0
+ * body-sha256: 7c0a0dccf3ae9ad4c2e9d502ad5ef871de1f576bac04e9e033666942647fdbcb
  */
 #include "ablowitz_ladik3.h"
 
@@ -50,80 +50,77 @@ static void ablowitz_ladik3_generate(const double coef[3], const double y[6], do
     const double t2 = coef[1] * x3;
     const double t3 = y1_ * y1_;
     const double t4 = x1 * x1;
-    const double t5 = t3 + (-1.0 + t4);
-    const double t6 = 1.0 / t5;
-    const double t7 = coef[1] * y3;
-    const double t8 = coef[1] * y2;
-    const double t9 = coef[1] * x1;
-    const double t10 = y2 * y2;
-    const double t11 = x2 * x2;
-    const double t12 = t10 + (-1.0 + t11);
-    const double t13 = 1.0 / t12;
-    const double t14 = coef[1] * y1_;
-    const double t15 = y3 * y3;
-    const double t16 = x3 * x3;
-    const double t17 = t15 + (-1.0 + t16);
-    const double t18 = 1.0 / t17;
-    const double t19 = 1.0 - t4;
-    const double t20 = t3 - t19;
-    const double t21 = coef[2] * (x1 * y1_ / (t5 * t5));
-    const double t22 = t19 - t3;
-    const double t23 = 1.0 - t11;
-    const double t24 = t23 - t10;
+    const double t5 = 1.0 / (t3 + (-1.0 + t4));
+    const double t6 = coef[1] * y3;
+    const double t7 = coef[1] * y2;
+    const double t8 = coef[1] * x1;
+    const double t9 = y2 * y2;
+    const double t10 = x2 * x2;
+    const double t11 = 1.0 / (t9 + (-1.0 + t10));
+    const double t12 = coef[1] * y1_;
+    const double t13 = y3 * y3;
+    const double t14 = x3 * x3;
+    const double t15 = 1.0 / (t13 + (-1.0 + t14));
+    const double t16 = 1.0 - t4;
+    const double t17 = t3 - t16;
+    const double t18 = coef[2] * (x1 * y1_ * (t5 * t5));
+    const double t19 = t16 - t3;
+    const double t20 = 1.0 - t10;
+    const double t21 = t20 - t9;
+    const double t22 = (-0.5) * (coef[1] * t21);
+    const double t23 = 1.0 - t14;
+    const double t24 = t23 - t13;
     const double t25 = (-0.5) * (coef[1] * t24);
-    const double t26 = 1.0 - t16;
-    const double t27 = t26 - t15;
-    const double t28 = (-0.5) * (coef[1] * t27);
-    const double t29 = t10 - t23;
-    const double t30 = (-0.5) * (coef[1] * t29);
-    const double t31 = t15 - t26;
-    const double t32 = (-0.5) * (coef[1] * t31);
-    const double t33 = (-0.5) * (coef[1] * t22);
-    const double t34 = coef[2] * (x2 * y2 / (t12 * t12));
-    const double t35 = (-0.5) * (coef[1] * t20);
-    const double t36 = coef[2] * (x3 * y3 / (t17 * t17));
-    slope[0] = t1 + t2 + coef[0] * (x1 * t6);
-    slope[1] = t7 + t8 + coef[0] * (y1_ * t6);
-    slope[2] = t9 + t2 + coef[0] * (x2 * t13);
-    slope[3] = t7 + t14 + coef[0] * (y2 * t13);
-    slope[4] = t1 + t9 + coef[0] * (x3 * t18);
-    slope[5] = t14 + t8 + coef[0] * (y3 * t18);
-    jacobian[0] = 1.0 - 0.5 * (t20 * t21);
-    jacobian[1] = (-0.5) * (t22 * (t6 * (coef[0] + coef[2] * (t4 * t6))));
+    const double t26 = t9 - t20;
+    const double t27 = (-0.5) * (coef[1] * t26);
+    const double t28 = t13 - t23;
+    const double t29 = (-0.5) * (coef[1] * t28);
+    const double t30 = (-0.5) * (coef[1] * t19);
+    const double t31 = coef[2] * (x2 * y2 * (t11 * t11));
+    const double t32 = (-0.5) * (coef[1] * t17);
+    const double t33 = coef[2] * (x3 * y3 * (t15 * t15));
+    slope[0] = t1 + t2 + coef[0] * (x1 * t5);
+    slope[1] = t6 + t7 + coef[0] * (y1_ * t5);
+    slope[2] = t8 + t2 + coef[0] * (x2 * t11);
+    slope[3] = t6 + t12 + coef[0] * (y2 * t11);
+    slope[4] = t1 + t8 + coef[0] * (x3 * t15);
+    slope[5] = t12 + t7 + coef[0] * (y3 * t15);
+    jacobian[0] = 1.0 - 0.5 * (t17 * t18);
+    jacobian[1] = (-0.5) * (t19 * (t5 * (coef[0] + coef[2] * (t4 * t5))));
     jacobian[2] = 0.0;
-    jacobian[3] = t25;
+    jacobian[3] = t22;
     jacobian[4] = 0.0;
-    jacobian[5] = t28;
-    jacobian[6] = (-0.5) * (t20 * (t6 * (coef[0] + coef[2] * (t3 * t6))));
-    jacobian[7] = 1.0 - 0.5 * (t22 * t21);
-    jacobian[8] = t30;
+    jacobian[5] = t25;
+    jacobian[6] = (-0.5) * (t17 * (t5 * (coef[0] + coef[2] * (t3 * t5))));
+    jacobian[7] = 1.0 - 0.5 * (t19 * t18);
+    jacobian[8] = t27;
     jacobian[9] = 0.0;
-    jacobian[10] = t32;
+    jacobian[10] = t29;
     jacobian[11] = 0.0;
     jacobian[12] = 0.0;
-    jacobian[13] = t33;
-    jacobian[14] = 1.0 - 0.5 * (t29 * t34);
-    jacobian[15] = (-0.5) * (t24 * (t13 * (coef[0] + coef[2] * (t11 * t13))));
+    jacobian[13] = t30;
+    jacobian[14] = 1.0 - 0.5 * (t26 * t31);
+    jacobian[15] = (-0.5) * (t21 * (t11 * (coef[0] + coef[2] * (t10 * t11))));
     jacobian[16] = 0.0;
-    jacobian[17] = t28;
-    jacobian[18] = t35;
+    jacobian[17] = t25;
+    jacobian[18] = t32;
     jacobian[19] = 0.0;
-    jacobian[20] = (-0.5) * (t29 * (t13 * (coef[0] + coef[2] * (t10 * t13))));
-    jacobian[21] = 1.0 - 0.5 * (t24 * t34);
-    jacobian[22] = t32;
+    jacobian[20] = (-0.5) * (t26 * (t11 * (coef[0] + coef[2] * (t9 * t11))));
+    jacobian[21] = 1.0 - 0.5 * (t21 * t31);
+    jacobian[22] = t29;
     jacobian[23] = 0.0;
     jacobian[24] = 0.0;
-    jacobian[25] = t33;
+    jacobian[25] = t30;
     jacobian[26] = 0.0;
-    jacobian[27] = t25;
-    jacobian[28] = 1.0 - 0.5 * (t31 * t36);
-    jacobian[29] = (-0.5) * (t27 * (t18 * (coef[0] + coef[2] * (t16 * t18))));
-    jacobian[30] = t35;
+    jacobian[27] = t22;
+    jacobian[28] = 1.0 - 0.5 * (t28 * t33);
+    jacobian[29] = (-0.5) * (t24 * (t15 * (coef[0] + coef[2] * (t14 * t15))));
+    jacobian[30] = t32;
     jacobian[31] = 0.0;
-    jacobian[32] = t30;
+    jacobian[32] = t27;
     jacobian[33] = 0.0;
-    jacobian[34] = (-0.5) * (t31 * (t18 * (coef[0] + coef[2] * (t15 * t18))));
-    jacobian[35] = 1.0 - 0.5 * (t27 * t36);
+    jacobian[34] = (-0.5) * (t28 * (t15 * (coef[0] + coef[2] * (t13 * t15))));
+    jacobian[35] = 1.0 - 0.5 * (t24 * t33);
 }
 
 /* Solve matrix * solution = side, both overwritten, by elimination with partial pivoting. 0 if singular. */
@@ -187,12 +184,12 @@ static void ablowitz_ladik3_predict(ablowitz_ladik3_memory *memory, double value
     for (int k = 0; k < memory->guess; ++k)
         for (int i = 0; i < 6; ++i) guess[0][i] += memory->lag[k][i];
     if (memory->trained) {
+        const int last = memory->count - 1;
         double odd[6] = { 0.0 };
-        const double(*past)[6] = memory->past + memory->count - 16;
         for (int k = 0; k < 16; k += 2)
             for (int i = 0; i < 6; ++i) {
-                guess[1][i] += memory->weight[k][i] * past[16 - 1 - k][i];
-                odd[i] += memory->weight[k + 1][i] * past[16 - 2 - k][i];
+                guess[1][i] += memory->weight[k][i] * memory->past[last - k][i];
+                odd[i] += memory->weight[k + 1][i] * memory->past[last - 1 - k][i];
             }
         for (int i = 0; i < 6; ++i) guess[1][i] += odd[i];
     }
@@ -205,15 +202,15 @@ static void ablowitz_ladik3_train(ablowitz_ladik3_memory *memory, int component)
 {
     enum { ROWS = 80 - 16, ALL = 80 };
     double q[16][ALL], r[16][16], b[ALL] = { 0.0 }, largest = 0.0;
-    const double(*past)[6] = memory->past + memory->count - 80;
+    const int first = memory->count - 80;
     memset(q, 0, sizeof q);
     for (int i = 0; i < 80; ++i)
-        if (fabs(past[i][component]) > largest) largest = fabs(past[i][component]);
+        if (fabs(memory->past[first + i][component]) > largest) largest = fabs(memory->past[first + i][component]);
     for (int k = 0; k < 16; ++k) {
-        for (int i = 0; i < ROWS; ++i) q[k][i] = past[i + 16 - 1 - k][component];
+        for (int i = 0; i < ROWS; ++i) q[k][i] = memory->past[first + i + 16 - 1 - k][component];
         q[k][ROWS + k] = 1e-13 * largest;
     }
-    for (int i = 0; i < ROWS; ++i) b[i] = past[i + 16][component];
+    for (int i = 0; i < ROWS; ++i) b[i] = memory->past[first + i + 16][component];
     for (int k = 0; k < 16; ++k) {
         double norm = 0.0, along = 0.0;
         for (int i = 0; i < ALL; ++i) norm += q[k][i] * q[k][i];

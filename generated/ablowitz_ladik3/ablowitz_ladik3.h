@@ -6,7 +6,7 @@
  *   generating function: S_1 (collected polynomial, 9 terms)
  *   step: implicit in p, each path followed by its Taylor series to round-off
  *   composition: suzuki, 5 stages of order 2
- *   one evaluation of the equation for p: 39 additions, 90 multiplications, 6 divisions
+ *   one evaluation of the equation for p: 39 additions, 90 multiplications, 3 divisions
  *
  * spec: ablowitz_ladik3, sha256 a19d6edf1db5d8f1f730a954b05596f3772fa764597865f240bd9a4588aef6f0
  * to regenerate: phigen build ablowitz_ladik3.yaml

@@ -5,7 +5,7 @@
 #   generating function: S_1 (collected polynomial, 9 terms)
 #   step: implicit in p, each path followed by its Taylor series to round-off
 #   composition: suzuki, 5 stages of order 2
-#   one evaluation of the equation for p: 39 additions, 90 multiplications, 6 divisions
+#   one evaluation of the equation for p: 39 additions, 90 multiplications, 3 divisions
 #
 # spec: ablowitz_ladik3, sha256 a19d6edf1db5d8f1f730a954b05596f3772fa764597865f240bd9a4588aef6f0
 # to regenerate: phigen build ablowitz_ladik3.yaml
@@ -13,7 +13,7 @@
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 1328c1f19b8e2f30da2bd809f0f68bac6b2158874bf105bc21653e5878c0d202
+# body-sha256: ce9efb1e9c9ea7f0adaa6b075390453cd3cb9d4b7c3d2e2400ab5d00fc41f1f9
 import numpy as np
 
 VERSION = "0.1.0"
@@ -78,8 +78,8 @@ def _prepare(parameters, h):
 
 
 def _generate(coef, y):
-    """P = grad s_h(y), and the jacobian 1 - hess s_h(y) pi(y) / 2 of the equation for p, up to
-    o(h^2)."""
+    """P = grad S_h(y), and the Jacobian 1 - Hess S_h(y) pi(y) / 2 of the equation for p, up to
+    O(h^2)."""
     x1 = y[..., 0]
     y1 = y[..., 1]
     x2 = y[..., 2]
@@ -90,84 +90,81 @@ def _generate(coef, y):
     t2 = coef[1] * x3
     t3 = y1 * y1
     t4 = x1 * x1
-    t5 = t3 + (-1.0 + t4)
-    t6 = 1.0 / t5
-    t7 = coef[1] * y3
-    t8 = coef[1] * y2
-    t9 = coef[1] * x1
-    t10 = y2 * y2
-    t11 = x2 * x2
-    t12 = t10 + (-1.0 + t11)
-    t13 = 1.0 / t12
-    t14 = coef[1] * y1
-    t15 = y3 * y3
-    t16 = x3 * x3
-    t17 = t15 + (-1.0 + t16)
-    t18 = 1.0 / t17
-    t19 = 1.0 - t4
-    t20 = t3 - t19
-    t21 = coef[2] * (x1 * y1 / (t5 * t5))
-    t22 = t19 - t3
-    t23 = 1.0 - t11
-    t24 = t23 - t10
+    t5 = 1.0 / (t3 + (-1.0 + t4))
+    t6 = coef[1] * y3
+    t7 = coef[1] * y2
+    t8 = coef[1] * x1
+    t9 = y2 * y2
+    t10 = x2 * x2
+    t11 = 1.0 / (t9 + (-1.0 + t10))
+    t12 = coef[1] * y1
+    t13 = y3 * y3
+    t14 = x3 * x3
+    t15 = 1.0 / (t13 + (-1.0 + t14))
+    t16 = 1.0 - t4
+    t17 = t3 - t16
+    t18 = coef[2] * (x1 * y1 * (t5 * t5))
+    t19 = t16 - t3
+    t20 = 1.0 - t10
+    t21 = t20 - t9
+    t22 = (-0.5) * (coef[1] * t21)
+    t23 = 1.0 - t14
+    t24 = t23 - t13
     t25 = (-0.5) * (coef[1] * t24)
-    t26 = 1.0 - t16
-    t27 = t26 - t15
-    t28 = (-0.5) * (coef[1] * t27)
-    t29 = t10 - t23
-    t30 = (-0.5) * (coef[1] * t29)
-    t31 = t15 - t26
-    t32 = (-0.5) * (coef[1] * t31)
-    t33 = (-0.5) * (coef[1] * t22)
-    t34 = coef[2] * (x2 * y2 / (t12 * t12))
-    t35 = (-0.5) * (coef[1] * t20)
-    t36 = coef[2] * (x3 * y3 / (t17 * t17))
+    t26 = t9 - t20
+    t27 = (-0.5) * (coef[1] * t26)
+    t28 = t13 - t23
+    t29 = (-0.5) * (coef[1] * t28)
+    t30 = (-0.5) * (coef[1] * t19)
+    t31 = coef[2] * (x2 * y2 * (t11 * t11))
+    t32 = (-0.5) * (coef[1] * t17)
+    t33 = coef[2] * (x3 * y3 * (t15 * t15))
     return (
         _filled(y, [
-            t1 + t2 + coef[0] * (x1 * t6),
-            t7 + t8 + coef[0] * (y1 * t6),
-            t9 + t2 + coef[0] * (x2 * t13),
-            t7 + t14 + coef[0] * (y2 * t13),
-            t1 + t9 + coef[0] * (x3 * t18),
-            t14 + t8 + coef[0] * (y3 * t18),
+            t1 + t2 + coef[0] * (x1 * t5),
+            t6 + t7 + coef[0] * (y1 * t5),
+            t8 + t2 + coef[0] * (x2 * t11),
+            t6 + t12 + coef[0] * (y2 * t11),
+            t1 + t8 + coef[0] * (x3 * t15),
+            t12 + t7 + coef[0] * (y3 * t15),
         ]),
         _filled(y, [
-            1.0 - 0.5 * (t20 * t21),
-            (-0.5) * (t22 * (t6 * (coef[0] + coef[2] * (t4 * t6)))),
+            1.0 - 0.5 * (t17 * t18),
+            (-0.5) * (t19 * (t5 * (coef[0] + coef[2] * (t4 * t5)))),
+            0.0,
+            t22,
             0.0,
             t25,
+            (-0.5) * (t17 * (t5 * (coef[0] + coef[2] * (t3 * t5)))),
+            1.0 - 0.5 * (t19 * t18),
+            t27,
             0.0,
-            t28,
-            (-0.5) * (t20 * (t6 * (coef[0] + coef[2] * (t3 * t6)))),
-            1.0 - 0.5 * (t22 * t21),
+            t29,
+            0.0,
+            0.0,
             t30,
-            0.0,
-            t32,
-            0.0,
-            0.0,
-            t33,
-            1.0 - 0.5 * (t29 * t34),
-            (-0.5) * (t24 * (t13 * (coef[0] + coef[2] * (t11 * t13)))),
-            0.0,
-            t28,
-            t35,
-            0.0,
-            (-0.5) * (t29 * (t13 * (coef[0] + coef[2] * (t10 * t13)))),
-            1.0 - 0.5 * (t24 * t34),
-            t32,
-            0.0,
-            0.0,
-            t33,
+            1.0 - 0.5 * (t26 * t31),
+            (-0.5) * (t21 * (t11 * (coef[0] + coef[2] * (t10 * t11)))),
             0.0,
             t25,
-            1.0 - 0.5 * (t31 * t36),
-            (-0.5) * (t27 * (t18 * (coef[0] + coef[2] * (t16 * t18)))),
-            t35,
+            t32,
+            0.0,
+            (-0.5) * (t26 * (t11 * (coef[0] + coef[2] * (t9 * t11)))),
+            1.0 - 0.5 * (t21 * t31),
+            t29,
+            0.0,
             0.0,
             t30,
             0.0,
-            (-0.5) * (t31 * (t18 * (coef[0] + coef[2] * (t15 * t18)))),
-            1.0 - 0.5 * (t27 * t36),
+            t22,
+            1.0 - 0.5 * (t28 * t33),
+            (-0.5) * (t24 * (t15 * (coef[0] + coef[2] * (t14 * t15)))),
+            t32,
+            0.0,
+            t27,
+            0.0,
+            (-0.5) * (t28 * (t15 * (coef[0] + coef[2] * (t13 * t15)))),
+            1.0 - 0.5 * (t24 * t33),
         ]).reshape(y.shape + (6,)),
     )
 
@@ -462,7 +459,7 @@ def integrate(x0, h, steps, stride=1, gauge=None, **parameters):
 
 
 def _energy(parameters, x):
-    """The hamiltonian."""
+    """The Hamiltonian."""
     x1 = x[..., 0]
     y1 = x[..., 1]
     x2 = x[..., 2]
@@ -474,12 +471,12 @@ def _energy(parameters, x):
 
 
 def _casimirs(parameters, x):
-    """The casimirs."""
+    """The Casimirs."""
     return _filled(x, [])
 
 
 def _vector_field(parameters, x):
-    """Pi(x) grad h(x)."""
+    """Pi(x) grad H(x)."""
     x1 = x[..., 0]
     y1 = x[..., 1]
     x2 = x[..., 2]

@@ -12,7 +12,7 @@
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 76ff6d59312130c103ee457c7842b55ccd803d0bdb13195b8fd0f3d9e59c6dc3
+# body-sha256: 452a8582e39e75350b61b69e94232de00750dd521d0ec6b59b4a9149d1938f7e
 import numpy as np
 
 VERSION = "0.1.0"
@@ -96,8 +96,8 @@ def _prepare(parameters, h):
 
 
 def _generate(coef, y):
-    """P = grad s_h(y), and the jacobian 1 - hess s_h(y) pi(y) / 2 of the equation for p, up to
-    o(h^2)."""
+    """P = grad S_h(y), and the Jacobian 1 - Hess S_h(y) pi(y) / 2 of the equation for p, up to
+    O(h^2)."""
     x = y[..., 0]
     y_ = y[..., 1]
     z = y[..., 2]
@@ -457,7 +457,7 @@ def integrate(x0, h, steps, stride=1, gauge=None, **parameters):
 
 
 def _energy(parameters, x):
-    """The hamiltonian."""
+    """The Hamiltonian."""
     x_ = x[..., 0]
     y = x[..., 1]
     z = x[..., 2]
@@ -468,12 +468,12 @@ def _energy(parameters, x):
 
 
 def _casimirs(parameters, x):
-    """The casimirs."""
+    """The Casimirs."""
     return _filled(x, [])
 
 
 def _vector_field(parameters, x):
-    """Pi(x) grad h(x)."""
+    """Pi(x) grad H(x)."""
     x_ = x[..., 0]
     y = x[..., 1]
     z = x[..., 2]

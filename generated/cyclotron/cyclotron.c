@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 55d7f965a7f43fa7955b422a8dfbb6019302140b560b40edb1b231669e6311e6
+ * body-sha256: f103f54b214e36c07667aecdb3044b9a694995e28000f45c163141cb617beb28
  */
 #include "cyclotron.h"
 
@@ -175,12 +175,12 @@ static void cyclotron_predict(cyclotron_memory *memory, double value[3])
     for (int k = 0; k < memory->guess; ++k)
         for (int i = 0; i < 3; ++i) guess[0][i] += memory->lag[k][i];
     if (memory->trained) {
+        const int last = memory->count - 1;
         double odd[3] = { 0.0 };
-        const double(*past)[3] = memory->past + memory->count - 16;
         for (int k = 0; k < 16; k += 2)
             for (int i = 0; i < 3; ++i) {
-                guess[1][i] += memory->weight[k][i] * past[16 - 1 - k][i];
-                odd[i] += memory->weight[k + 1][i] * past[16 - 2 - k][i];
+                guess[1][i] += memory->weight[k][i] * memory->past[last - k][i];
+                odd[i] += memory->weight[k + 1][i] * memory->past[last - 1 - k][i];
             }
         for (int i = 0; i < 3; ++i) guess[1][i] += odd[i];
     }
@@ -193,15 +193,15 @@ static void cyclotron_train(cyclotron_memory *memory, int component)
 {
     enum { ROWS = 80 - 16, ALL = 80 };
     double q[16][ALL], r[16][16], b[ALL] = { 0.0 }, largest = 0.0;
-    const double(*past)[3] = memory->past + memory->count - 80;
+    const int first = memory->count - 80;
     memset(q, 0, sizeof q);
     for (int i = 0; i < 80; ++i)
-        if (fabs(past[i][component]) > largest) largest = fabs(past[i][component]);
+        if (fabs(memory->past[first + i][component]) > largest) largest = fabs(memory->past[first + i][component]);
     for (int k = 0; k < 16; ++k) {
-        for (int i = 0; i < ROWS; ++i) q[k][i] = past[i + 16 - 1 - k][component];
+        for (int i = 0; i < ROWS; ++i) q[k][i] = memory->past[first + i + 16 - 1 - k][component];
         q[k][ROWS + k] = 1e-13 * largest;
     }
-    for (int i = 0; i < ROWS; ++i) b[i] = past[i + 16][component];
+    for (int i = 0; i < ROWS; ++i) b[i] = memory->past[first + i + 16][component];
     for (int k = 0; k < 16; ++k) {
         double norm = 0.0, along = 0.0;
         for (int i = 0; i < ALL; ++i) norm += q[k][i] * q[k][i];
@@ -280,7 +280,7 @@ static double cyclotron_size(const double y[3], const double delta[3])
 
 /* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the extrapolated guess, and advance. The
    increment is corrected to first order by the last Newton correction, so that correction costs no evaluation:
-   a correction is accepted when the error that remains after it, quadratic in it, is below 1e-17. */
+   a correction is accepted when the error that remains after it, quadratic in it, is below 1e-18. */
 static cyclotron_status cyclotron_attempt(cyclotron_solver *s, int stage)
 {
     const double *coef = s->coef[stage];
@@ -302,7 +302,7 @@ static cyclotron_status cyclotron_attempt(cyclotron_solver *s, int stage)
         const double growth = size / (previous * previous);
         const double remaining = size * size * (growth > 1.0 ? growth : 1.0);
         /* The second test: corrections no longer shrink, the solve has reached the level of rounding. */
-        if (remaining <= 1e-17 || (previous < 1e-8 && size > 0.25 * previous)) {
+        if (remaining <= 1e-18 || (previous < 1e-8 && size > 0.25 * previous)) {
             double offset[3];
             for (int i = 0; i < 3; ++i) {
                 offset[i] = y[i] - s->x[i];

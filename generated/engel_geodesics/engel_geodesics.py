@@ -12,7 +12,7 @@
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 5316533d2d5b182991c4f12f9804b6a0e01479845266eac561d0c846a35f2025
+# body-sha256: 81942860de409e4bfe28fcbeef31eb16c83d984f751cf66b0aed7e6206e9bd01
 import numpy as np
 
 VERSION = "0.1.0"
@@ -78,8 +78,8 @@ def _prepare(parameters, h):
 
 
 def _linearise(coef, y):
-    """At the point y: displacement alpha - y, increment beta - alpha, the jacobian of alpha and that of
-    the increment, all with the momenta p = grad s_h(y)."""
+    """At the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of
+    the increment, all with the momenta p = grad S_h(y)."""
     h1 = y[..., 0]
     h2 = y[..., 1]
     h3 = y[..., 2]
@@ -172,7 +172,7 @@ def _attempt(coef, x, carry, y):
     """Solve (y - x) + displacement(y) = 0 for y by Newton's method, and advance; arrays (members, DIM).
 
     The increment is corrected to first order by the last Newton correction, which is accepted when the error that
-    remains, quadratic in it, is below 1e-17. Returns new x, carry, y, and a status for each member,
+    remains, quadratic in it, is below 1e-18. Returns new x, carry, y, and a status for each member,
     "" if good.
     """
     x, carry, y = x.copy(), carry.copy(), y.copy()
@@ -189,7 +189,7 @@ def _attempt(coef, x, carry, y):
         y[open_] -= delta
         remaining = size**2 * np.maximum(1.0, size / previous[open_] ** 2)
         # The second test: corrections no longer shrink, the solve has reached the level of rounding.
-        done = (remaining <= 1e-17) | ((previous[open_] < 1e-8) & (size > 0.25 * previous[open_]))
+        done = (remaining <= 1e-18) | ((previous[open_] < 1e-8) & (size > 0.25 * previous[open_]))
         change = increment - (increment_jacobian @ delta[..., np.newaxis])[..., 0]
         total, rest = _sum(x[open_], carry[open_], change)
         good = done & np.isfinite(total).all(axis=-1)
@@ -283,14 +283,14 @@ def integrate(x0, h, steps, stride=1, gauge=None, **parameters):
 
 
 def _energy(parameters, x):
-    """The hamiltonian."""
+    """The Hamiltonian."""
     h1 = x[..., 0]
     h2 = x[..., 1]
     return _filled(x, [0.5 * (h2 * h2 + h1 * h1)])
 
 
 def _casimirs(parameters, x):
-    """The casimirs."""
+    """The Casimirs."""
     h2 = x[..., 1]
     h3 = x[..., 2]
     h4 = x[..., 3]
@@ -298,7 +298,7 @@ def _casimirs(parameters, x):
 
 
 def _vector_field(parameters, x):
-    """Pi(x) grad h(x)."""
+    """Pi(x) grad H(x)."""
     h1 = x[..., 0]
     h2 = x[..., 1]
     h3 = x[..., 2]

@@ -12,7 +12,7 @@
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 102a538178f5a793a2df48b1f4b508b9ec5e20d7a5ac2ae36942c289605a0dd2
+# body-sha256: cdb72e045fe72144755a0ba1b399a1e3e52ba94b3ec416bbd26abafb00a23752
 import numpy as np
 
 VERSION = "0.1.0"
@@ -192,8 +192,8 @@ def _prepare(parameters, h):
 
 
 def _linearise(coef, y):
-    """At the point y: displacement alpha - y, increment beta - alpha, the jacobian of alpha and that of
-    the increment, all with the momenta p = grad s_h(y)."""
+    """At the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of
+    the increment, all with the momenta p = grad S_h(y)."""
     a = y[..., 0]
     b = y[..., 1]
     c = y[..., 2]
@@ -293,7 +293,7 @@ def _attempt(coef, x, carry, y):
     """Solve (y - x) + displacement(y) = 0 for y by Newton's method, and advance; arrays (members, DIM).
 
     The increment is corrected to first order by the last Newton correction, which is accepted when the error that
-    remains, quadratic in it, is below 1e-17. Returns new x, carry, y, and a status for each member,
+    remains, quadratic in it, is below 1e-18. Returns new x, carry, y, and a status for each member,
     "" if good.
     """
     x, carry, y = x.copy(), carry.copy(), y.copy()
@@ -310,7 +310,7 @@ def _attempt(coef, x, carry, y):
         y[open_] -= delta
         remaining = size**2 * np.maximum(1.0, size / previous[open_] ** 2)
         # The second test: corrections no longer shrink, the solve has reached the level of rounding.
-        done = (remaining <= 1e-17) | ((previous[open_] < 1e-8) & (size > 0.25 * previous[open_]))
+        done = (remaining <= 1e-18) | ((previous[open_] < 1e-8) & (size > 0.25 * previous[open_]))
         change = increment - (increment_jacobian @ delta[..., np.newaxis])[..., 0]
         total, rest = _sum(x[open_], carry[open_], change)
         good = done & np.isfinite(total).all(axis=-1)
@@ -404,7 +404,7 @@ def integrate(x0, h, steps, stride=1, gauge=None, **parameters):
 
 
 def _energy(parameters, x):
-    """The hamiltonian."""
+    """The Hamiltonian."""
     k = parameters["k"]
     g = parameters["g"]
     a = x[..., 0]
@@ -413,7 +413,7 @@ def _energy(parameters, x):
 
 
 def _casimirs(parameters, x):
-    """The casimirs."""
+    """The Casimirs."""
     a = x[..., 0]
     b = x[..., 1]
     c = x[..., 2]
@@ -421,7 +421,7 @@ def _casimirs(parameters, x):
 
 
 def _vector_field(parameters, x):
-    """Pi(x) grad h(x)."""
+    """Pi(x) grad H(x)."""
     k = parameters["k"]
     g = parameters["g"]
     a = x[..., 0]

@@ -13,7 +13,7 @@
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: a0e02c6838d632d7c34d2c7b3b58af499dcf5e83361683c54c714558c437fc9d
+# body-sha256: 5e8d6a305114b0dda5719b4e92965a1d416381a5ef96bf6a63fbbbc754977129
 import numpy as np
 
 VERSION = "0.1.0"
@@ -85,8 +85,8 @@ def _prepare(parameters, h):
 
 
 def _generate(coef, y):
-    """P = grad s_h(y), and the jacobian 1 - hess s_h(y) pi(y) / 2 of the equation for p, up to
-    o(h^2)."""
+    """P = grad S_h(y), and the Jacobian 1 - Hess S_h(y) pi(y) / 2 of the equation for p, up to
+    O(h^2)."""
     x = y[..., 0]
     y_ = y[..., 1]
     z = y[..., 2]
@@ -511,7 +511,7 @@ def integrate(x0, h, steps, stride=1, gauge=None, **parameters):
 
 
 def _energy(parameters, x):
-    """The hamiltonian."""
+    """The Hamiltonian."""
     kappa = parameters["kappa"]
     mu = parameters["mu"]
     k = parameters["k"]
@@ -524,12 +524,12 @@ def _energy(parameters, x):
 
 
 def _casimirs(parameters, x):
-    """The casimirs."""
+    """The Casimirs."""
     return _filled(x, [])
 
 
 def _vector_field(parameters, x):
-    """Pi(x) grad h(x)."""
+    """Pi(x) grad H(x)."""
     kappa = parameters["kappa"]
     mu = parameters["mu"]
     k = parameters["k"]

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 43b12371808fb87d6df63949ccd9be498994c682347653278550b9d069a031c1
+ * body-sha256: c4e8410b99dc728d13c70e59651e5937774564c81323a15ad6ca5a975f06af9a
  */
 #include "kepler.h"
 
@@ -568,12 +568,12 @@ static void kepler_predict(kepler_memory *memory, double value[4])
     for (int k = 0; k < memory->guess; ++k)
         for (int i = 0; i < 4; ++i) guess[0][i] += memory->lag[k][i];
     if (memory->trained) {
+        const int last = memory->count - 1;
         double odd[4] = { 0.0 };
-        const double(*past)[4] = memory->past + memory->count - 16;
         for (int k = 0; k < 16; k += 2)
             for (int i = 0; i < 4; ++i) {
-                guess[1][i] += memory->weight[k][i] * past[16 - 1 - k][i];
-                odd[i] += memory->weight[k + 1][i] * past[16 - 2 - k][i];
+                guess[1][i] += memory->weight[k][i] * memory->past[last - k][i];
+                odd[i] += memory->weight[k + 1][i] * memory->past[last - 1 - k][i];
             }
         for (int i = 0; i < 4; ++i) guess[1][i] += odd[i];
     }
@@ -586,15 +586,15 @@ static void kepler_train(kepler_memory *memory, int component)
 {
     enum { ROWS = 80 - 16, ALL = 80 };
     double q[16][ALL], r[16][16], b[ALL] = { 0.0 }, largest = 0.0;
-    const double(*past)[4] = memory->past + memory->count - 80;
+    const int first = memory->count - 80;
     memset(q, 0, sizeof q);
     for (int i = 0; i < 80; ++i)
-        if (fabs(past[i][component]) > largest) largest = fabs(past[i][component]);
+        if (fabs(memory->past[first + i][component]) > largest) largest = fabs(memory->past[first + i][component]);
     for (int k = 0; k < 16; ++k) {
-        for (int i = 0; i < ROWS; ++i) q[k][i] = past[i + 16 - 1 - k][component];
+        for (int i = 0; i < ROWS; ++i) q[k][i] = memory->past[first + i + 16 - 1 - k][component];
         q[k][ROWS + k] = 1e-13 * largest;
     }
-    for (int i = 0; i < ROWS; ++i) b[i] = past[i + 16][component];
+    for (int i = 0; i < ROWS; ++i) b[i] = memory->past[first + i + 16][component];
     for (int k = 0; k < 16; ++k) {
         double norm = 0.0, along = 0.0;
         for (int i = 0; i < ALL; ++i) norm += q[k][i] * q[k][i];
@@ -673,7 +673,7 @@ static double kepler_size(const double y[4], const double delta[4])
 
 /* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the extrapolated guess, and advance. The
    increment is corrected to first order by the last Newton correction, so that correction costs no evaluation:
-   a correction is accepted when the error that remains after it, quadratic in it, is below 1e-17. */
+   a correction is accepted when the error that remains after it, quadratic in it, is below 1e-18. */
 static kepler_status kepler_attempt(kepler_solver *s, int stage)
 {
     const double *coef = s->coef[stage];
@@ -695,7 +695,7 @@ static kepler_status kepler_attempt(kepler_solver *s, int stage)
         const double growth = size / (previous * previous);
         const double remaining = size * size * (growth > 1.0 ? growth : 1.0);
         /* The second test: corrections no longer shrink, the solve has reached the level of rounding. */
-        if (remaining <= 1e-17 || (previous < 1e-8 && size > 0.25 * previous)) {
+        if (remaining <= 1e-18 || (previous < 1e-8 && size > 0.25 * previous)) {
             double offset[4];
             for (int i = 0; i < 4; ++i) {
                 offset[i] = y[i] - s->x[i];

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 749f49f0c2bccc3e6a214323ab568711c08e04b657c9f2bc870f0511937bb67b
+ * body-sha256: bd182d763c5a64ba9b8c32c54461e4a133aac94fc36bffc8d306899118ba90f2
  */
 #include "lagrange_top.h"
 
@@ -178,7 +178,7 @@ static void lagrange_top_prepare(const lagrange_top_params *params, double h, do
     const double t2 = 1.0 / params->I1;
     const double t3 = 1.0 / 12.0 * t2;
     const double t4 = h * (h * h);
-    const double t5 = t4 * t2 * (1.0 / 24.0 / (params->I1 * params->I1) + t1 * (1.0 / 24.0 * t1 - t3));
+    const double t5 = t4 * t2 * (1.0 / 24.0 * (t2 * t2) + t1 * (1.0 / 24.0 * t1 - t3));
     const double t6 = h * params->mgl;
     coef[0] = (1.0 / 12.0 * t1 - t3) * (t2 * (params->mgl * t4));
     coef[1] = h * t2;
@@ -675,12 +675,12 @@ static void lagrange_top_predict(lagrange_top_memory *memory, double value[6])
     for (int k = 0; k < memory->guess; ++k)
         for (int i = 0; i < 6; ++i) guess[0][i] += memory->lag[k][i];
     if (memory->trained) {
+        const int last = memory->count - 1;
         double odd[6] = { 0.0 };
-        const double(*past)[6] = memory->past + memory->count - 16;
         for (int k = 0; k < 16; k += 2)
             for (int i = 0; i < 6; ++i) {
-                guess[1][i] += memory->weight[k][i] * past[16 - 1 - k][i];
-                odd[i] += memory->weight[k + 1][i] * past[16 - 2 - k][i];
+                guess[1][i] += memory->weight[k][i] * memory->past[last - k][i];
+                odd[i] += memory->weight[k + 1][i] * memory->past[last - 1 - k][i];
             }
         for (int i = 0; i < 6; ++i) guess[1][i] += odd[i];
     }
@@ -693,15 +693,15 @@ static void lagrange_top_train(lagrange_top_memory *memory, int component)
 {
     enum { ROWS = 80 - 16, ALL = 80 };
     double q[16][ALL], r[16][16], b[ALL] = { 0.0 }, largest = 0.0;
-    const double(*past)[6] = memory->past + memory->count - 80;
+    const int first = memory->count - 80;
     memset(q, 0, sizeof q);
     for (int i = 0; i < 80; ++i)
-        if (fabs(past[i][component]) > largest) largest = fabs(past[i][component]);
+        if (fabs(memory->past[first + i][component]) > largest) largest = fabs(memory->past[first + i][component]);
     for (int k = 0; k < 16; ++k) {
-        for (int i = 0; i < ROWS; ++i) q[k][i] = past[i + 16 - 1 - k][component];
+        for (int i = 0; i < ROWS; ++i) q[k][i] = memory->past[first + i + 16 - 1 - k][component];
         q[k][ROWS + k] = 1e-13 * largest;
     }
-    for (int i = 0; i < ROWS; ++i) b[i] = past[i + 16][component];
+    for (int i = 0; i < ROWS; ++i) b[i] = memory->past[first + i + 16][component];
     for (int k = 0; k < 16; ++k) {
         double norm = 0.0, along = 0.0;
         for (int i = 0; i < ALL; ++i) norm += q[k][i] * q[k][i];
@@ -780,7 +780,7 @@ static double lagrange_top_size(const double y[6], const double delta[6])
 
 /* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the extrapolated guess, and advance. The
    increment is corrected to first order by the last Newton correction, so that correction costs no evaluation:
-   a correction is accepted when the error that remains after it, quadratic in it, is below 1e-17. */
+   a correction is accepted when the error that remains after it, quadratic in it, is below 1e-18. */
 static lagrange_top_status lagrange_top_attempt(lagrange_top_solver *s, int stage)
 {
     const double *coef = s->coef[stage];
@@ -802,7 +802,7 @@ static lagrange_top_status lagrange_top_attempt(lagrange_top_solver *s, int stag
         const double growth = size / (previous * previous);
         const double remaining = size * size * (growth > 1.0 ? growth : 1.0);
         /* The second test: corrections no longer shrink, the solve has reached the level of rounding. */
-        if (remaining <= 1e-17 || (previous < 1e-8 && size > 0.25 * previous)) {
+        if (remaining <= 1e-18 || (previous < 1e-8 && size > 0.25 * previous)) {
             double offset[6];
             for (int i = 0; i < 6; ++i) {
                 offset[i] = y[i] - s->x[i];

@@ -12,7 +12,7 @@
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 9e9e56e1d3a8e0758ec07f1d036785be7dea9039b638b4d1f5ecce0fe3efea5c
+# body-sha256: 28c9aa5e20351e80dd38b95633ed6aa02c64438e3b81ce97b2f48dc2cabd8ff4
 import numpy as np
 
 VERSION = "0.1.0"
@@ -218,7 +218,7 @@ def _prepare(parameters, h):
     t2 = 1.0 / I1
     t3 = 1.0 / 12.0 * t2
     t4 = h * (h * h)
-    t5 = t4 * t2 * (1.0 / 24.0 / (I1 * I1) + t1 * (1.0 / 24.0 * t1 - t3))
+    t5 = t4 * t2 * (1.0 / 24.0 * (t2 * t2) + t1 * (1.0 / 24.0 * t1 - t3))
     t6 = h * mgl
     return [
             (1.0 / 12.0 * t1 - t3) * (t2 * (mgl * t4)),
@@ -233,8 +233,8 @@ def _prepare(parameters, h):
 
 
 def _linearise(coef, y):
-    """At the point y: displacement alpha - y, increment beta - alpha, the jacobian of alpha and that of
-    the increment, all with the momenta p = grad s_h(y)."""
+    """At the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of
+    the increment, all with the momenta p = grad S_h(y)."""
     P1 = y[..., 0]
     P2 = y[..., 1]
     P3 = y[..., 2]
@@ -643,7 +643,7 @@ def _attempt(coef, x, carry, y):
     """Solve (y - x) + displacement(y) = 0 for y by Newton's method, and advance; arrays (members, DIM).
 
     The increment is corrected to first order by the last Newton correction, which is accepted when the error that
-    remains, quadratic in it, is below 1e-17. Returns new x, carry, y, and a status for each member,
+    remains, quadratic in it, is below 1e-18. Returns new x, carry, y, and a status for each member,
     "" if good.
     """
     x, carry, y = x.copy(), carry.copy(), y.copy()
@@ -660,7 +660,7 @@ def _attempt(coef, x, carry, y):
         y[open_] -= delta
         remaining = size**2 * np.maximum(1.0, size / previous[open_] ** 2)
         # The second test: corrections no longer shrink, the solve has reached the level of rounding.
-        done = (remaining <= 1e-17) | ((previous[open_] < 1e-8) & (size > 0.25 * previous[open_]))
+        done = (remaining <= 1e-18) | ((previous[open_] < 1e-8) & (size > 0.25 * previous[open_]))
         change = increment - (increment_jacobian @ delta[..., np.newaxis])[..., 0]
         total, rest = _sum(x[open_], carry[open_], change)
         good = done & np.isfinite(total).all(axis=-1)
@@ -754,7 +754,7 @@ def integrate(x0, h, steps, stride=1, gauge=None, **parameters):
 
 
 def _energy(parameters, x):
-    """The hamiltonian."""
+    """The Hamiltonian."""
     I1 = parameters["I1"]
     I3 = parameters["I3"]
     mgl = parameters["mgl"]
@@ -766,7 +766,7 @@ def _energy(parameters, x):
 
 
 def _casimirs(parameters, x):
-    """The casimirs."""
+    """The Casimirs."""
     P1 = x[..., 0]
     P2 = x[..., 1]
     P3 = x[..., 2]
@@ -777,7 +777,7 @@ def _casimirs(parameters, x):
 
 
 def _vector_field(parameters, x):
-    """Pi(x) grad h(x)."""
+    """Pi(x) grad H(x)."""
     I1 = parameters["I1"]
     I3 = parameters["I3"]
     mgl = parameters["mgl"]

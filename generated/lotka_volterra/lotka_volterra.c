@@ -5,7 +5,7 @@
  *   bi-realisation: log-canonical, symmetric
  *   generating function: S_1 (collected polynomial, 3 terms)
  *   step: implicit, Newton iteration with the analytic matrix
- *   one Newton iteration: 9 additions, 34 multiplications, 9 functions
+ *   one Newton iteration: 13 additions, 47 multiplications, 3 divisions, 3 functions
  *
  * spec: lotka_volterra, sha256 a253a78f7e0887e5a834a02b0b1f47451af2de51574fd76b016f875f92baa539
  * to regenerate: phigen build lotka_volterra.yaml
@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 3c2ceeca4cb9823b20fed3ced5f5347077b91bd0f77f8ba8c9404358edb275bf
+ * body-sha256: a22a4ce5c060bed36d6550d0a2f44045c2d6a9ec9f1660643400727dd52c1abe
  */
 #include "lotka_volterra.h"
 
@@ -44,49 +44,56 @@ static void lotka_volterra_linearise(const double coef[1], const double y[3], do
     const double x3 = y[2];
     const double t1 = coef[0] * x2;
     const double t2 = coef[0] * x3;
-    const double t3 = (-0.5) * (t1 + t2);
-    const double t4 = exp(t3);
-    const double t5 = t4 - 1.0;
-    const double t6 = coef[0] * x1;
-    const double t7 = 0.5 * (t6 - t2);
-    const double t8 = exp(t7);
-    const double t9 = t8 - 1.0;
-    const double t10 = 0.5 * (t1 + t6);
-    const double t11 = exp(t10);
-    const double t12 = t11 - 1.0;
-    const double t13 = sinh(t3);
-    const double t14 = sinh(t7);
-    const double t15 = sinh(t10);
-    const double t16 = (-0.5) * (x1 * (coef[0] * t4));
-    const double t17 = x2 * (coef[0] * t8);
-    const double t18 = 0.5 * (x3 * (coef[0] * t11));
-    const double t19 = x1 * (coef[0] * cosh(t3));
-    const double t20 = x2 * (coef[0] * cosh(t7));
-    const double t21 = -(x3 * (coef[0] * cosh(t10)));
-    displacement[0] = x1 * t5;
-    displacement[1] = x2 * t9;
-    displacement[2] = x3 * t12;
-    increment[0] = (-2.0) * (x1 * t13);
-    increment[1] = (-2.0) * (x2 * t14);
-    increment[2] = (-2.0) * (x3 * t15);
-    jacobian[0] = 1.0 + t5;
-    jacobian[1] = t16;
-    jacobian[2] = t16;
-    jacobian[3] = 0.5 * t17;
-    jacobian[4] = 1.0 + t9;
-    jacobian[5] = (-0.5) * t17;
-    jacobian[6] = t18;
-    jacobian[7] = t18;
-    jacobian[8] = 1.0 + t12;
-    increment_jacobian[0] = (-2.0) * t13;
-    increment_jacobian[1] = t19;
-    increment_jacobian[2] = t19;
-    increment_jacobian[3] = -t20;
-    increment_jacobian[4] = (-2.0) * t14;
-    increment_jacobian[5] = t20;
-    increment_jacobian[6] = t21;
-    increment_jacobian[7] = t21;
-    increment_jacobian[8] = (-2.0) * t15;
+    const double t3 = expm1((-0.5) * (t1 + t2));
+    const double t4 = coef[0] * x1;
+    const double t5 = expm1(0.5 * (t4 - t2));
+    const double t6 = expm1(0.5 * (t1 + t4));
+    const double t7 = 1.0 + t3;
+    const double t8 = 1.0 / t7;
+    const double t9 = 1.0 + t8;
+    const double t10 = t3 * t9;
+    const double t11 = 1.0 + t5;
+    const double t12 = 1.0 / t11;
+    const double t13 = 1.0 + t12;
+    const double t14 = t5 * t13;
+    const double t15 = 1.0 + t6;
+    const double t16 = 1.0 / t15;
+    const double t17 = 1.0 + t16;
+    const double t18 = t6 * t17;
+    const double t19 = coef[0] * t7;
+    const double t20 = (-0.5) * (x1 * t19);
+    const double t21 = coef[0] * t11;
+    const double t22 = x2 * t21;
+    const double t23 = coef[0] * t15;
+    const double t24 = 0.5 * (x3 * t23);
+    const double t25 = -(x1 * (0.5 * (t3 * (t19 * (t8 * t8))) - 0.5 * (t19 * t9)));
+    const double t26 = 0.5 * (t21 * t13);
+    const double t27 = 0.5 * (t5 * (t21 * (t12 * t12)));
+    const double t28 = -(x3 * (0.5 * (t23 * t17) - 0.5 * (t6 * (t23 * (t16 * t16)))));
+    displacement[0] = x1 * t3;
+    displacement[1] = x2 * t5;
+    displacement[2] = x3 * t6;
+    increment[0] = -(x1 * t10);
+    increment[1] = -(x2 * t14);
+    increment[2] = -(x3 * t18);
+    jacobian[0] = t7;
+    jacobian[1] = t20;
+    jacobian[2] = t20;
+    jacobian[3] = 0.5 * t22;
+    jacobian[4] = t11;
+    jacobian[5] = (-0.5) * t22;
+    jacobian[6] = t24;
+    jacobian[7] = t24;
+    jacobian[8] = t15;
+    increment_jacobian[0] = -t10;
+    increment_jacobian[1] = t25;
+    increment_jacobian[2] = t25;
+    increment_jacobian[3] = -(x2 * (t26 - t27));
+    increment_jacobian[4] = -t14;
+    increment_jacobian[5] = -(x2 * (t27 - t26));
+    increment_jacobian[6] = t28;
+    increment_jacobian[7] = t28;
+    increment_jacobian[8] = -t18;
 }
 
 /* Solve matrix * solution = side, both overwritten, by elimination with partial pivoting. 0 if singular. */
@@ -185,12 +192,12 @@ static void lotka_volterra_predict(lotka_volterra_memory *memory, double value[3
     for (int k = 0; k < memory->guess; ++k)
         for (int i = 0; i < 3; ++i) guess[0][i] += memory->lag[k][i];
     if (memory->trained) {
+        const int last = memory->count - 1;
         double odd[3] = { 0.0 };
-        const double(*past)[3] = memory->past + memory->count - 16;
         for (int k = 0; k < 16; k += 2)
             for (int i = 0; i < 3; ++i) {
-                guess[1][i] += memory->weight[k][i] * past[16 - 1 - k][i];
-                odd[i] += memory->weight[k + 1][i] * past[16 - 2 - k][i];
+                guess[1][i] += memory->weight[k][i] * memory->past[last - k][i];
+                odd[i] += memory->weight[k + 1][i] * memory->past[last - 1 - k][i];
             }
         for (int i = 0; i < 3; ++i) guess[1][i] += odd[i];
     }
@@ -203,15 +210,15 @@ static void lotka_volterra_train(lotka_volterra_memory *memory, int component)
 {
     enum { ROWS = 80 - 16, ALL = 80 };
     double q[16][ALL], r[16][16], b[ALL] = { 0.0 }, largest = 0.0;
-    const double(*past)[3] = memory->past + memory->count - 80;
+    const int first = memory->count - 80;
     memset(q, 0, sizeof q);
     for (int i = 0; i < 80; ++i)
-        if (fabs(past[i][component]) > largest) largest = fabs(past[i][component]);
+        if (fabs(memory->past[first + i][component]) > largest) largest = fabs(memory->past[first + i][component]);
     for (int k = 0; k < 16; ++k) {
-        for (int i = 0; i < ROWS; ++i) q[k][i] = past[i + 16 - 1 - k][component];
+        for (int i = 0; i < ROWS; ++i) q[k][i] = memory->past[first + i + 16 - 1 - k][component];
         q[k][ROWS + k] = 1e-13 * largest;
     }
-    for (int i = 0; i < ROWS; ++i) b[i] = past[i + 16][component];
+    for (int i = 0; i < ROWS; ++i) b[i] = memory->past[first + i + 16][component];
     for (int k = 0; k < 16; ++k) {
         double norm = 0.0, along = 0.0;
         for (int i = 0; i < ALL; ++i) norm += q[k][i] * q[k][i];
@@ -289,7 +296,7 @@ static double lotka_volterra_size(const double y[3], const double delta[3])
 
 /* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the extrapolated guess, and advance. The
    increment is corrected to first order by the last Newton correction, so that correction costs no evaluation:
-   a correction is accepted when the error that remains after it, quadratic in it, is below 1e-17. */
+   a correction is accepted when the error that remains after it, quadratic in it, is below 1e-18. */
 static lotka_volterra_status lotka_volterra_attempt(lotka_volterra_solver *s, int stage)
 {
     const double *coef = s->coef[stage];
@@ -311,7 +318,7 @@ static lotka_volterra_status lotka_volterra_attempt(lotka_volterra_solver *s, in
         const double growth = size / (previous * previous);
         const double remaining = size * size * (growth > 1.0 ? growth : 1.0);
         /* The second test: corrections no longer shrink, the solve has reached the level of rounding. */
-        if (remaining <= 1e-17 || (previous < 1e-8 && size > 0.25 * previous)) {
+        if (remaining <= 1e-18 || (previous < 1e-8 && size > 0.25 * previous)) {
             double offset[3];
             for (int i = 0; i < 3; ++i) {
                 offset[i] = y[i] - s->x[i];

@@ -5,7 +5,7 @@
  *   bi-realisation: log-canonical, symmetric
  *   generating function: S_1 (collected polynomial, 3 terms)
  *   step: implicit, Newton iteration with the analytic matrix
- *   one Newton iteration: 9 additions, 34 multiplications, 9 functions
+ *   one Newton iteration: 13 additions, 47 multiplications, 3 divisions, 3 functions
  *
  * spec: lotka_volterra, sha256 a253a78f7e0887e5a834a02b0b1f47451af2de51574fd76b016f875f92baa539
  * to regenerate: phigen build lotka_volterra.yaml

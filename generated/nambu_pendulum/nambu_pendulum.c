@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 918e15f2578047eab2e8bf63b10c25d30ee0c360ce22734062f0c65a759e3c63
+ * body-sha256: 48354d4b9ce472daacd3b6ce82965855718e3dce399c3a3d7151b001925df3ab
  */
 #include "nambu_pendulum.h"
 
@@ -153,12 +153,12 @@ static void nambu_pendulum_predict(nambu_pendulum_memory *memory, double value[3
     for (int k = 0; k < memory->guess; ++k)
         for (int i = 0; i < 3; ++i) guess[0][i] += memory->lag[k][i];
     if (memory->trained) {
+        const int last = memory->count - 1;
         double odd[3] = { 0.0 };
-        const double(*past)[3] = memory->past + memory->count - 16;
         for (int k = 0; k < 16; k += 2)
             for (int i = 0; i < 3; ++i) {
-                guess[1][i] += memory->weight[k][i] * past[16 - 1 - k][i];
-                odd[i] += memory->weight[k + 1][i] * past[16 - 2 - k][i];
+                guess[1][i] += memory->weight[k][i] * memory->past[last - k][i];
+                odd[i] += memory->weight[k + 1][i] * memory->past[last - 1 - k][i];
             }
         for (int i = 0; i < 3; ++i) guess[1][i] += odd[i];
     }
@@ -171,15 +171,15 @@ static void nambu_pendulum_train(nambu_pendulum_memory *memory, int component)
 {
     enum { ROWS = 80 - 16, ALL = 80 };
     double q[16][ALL], r[16][16], b[ALL] = { 0.0 }, largest = 0.0;
-    const double(*past)[3] = memory->past + memory->count - 80;
+    const int first = memory->count - 80;
     memset(q, 0, sizeof q);
     for (int i = 0; i < 80; ++i)
-        if (fabs(past[i][component]) > largest) largest = fabs(past[i][component]);
+        if (fabs(memory->past[first + i][component]) > largest) largest = fabs(memory->past[first + i][component]);
     for (int k = 0; k < 16; ++k) {
-        for (int i = 0; i < ROWS; ++i) q[k][i] = past[i + 16 - 1 - k][component];
+        for (int i = 0; i < ROWS; ++i) q[k][i] = memory->past[first + i + 16 - 1 - k][component];
         q[k][ROWS + k] = 1e-13 * largest;
     }
-    for (int i = 0; i < ROWS; ++i) b[i] = past[i + 16][component];
+    for (int i = 0; i < ROWS; ++i) b[i] = memory->past[first + i + 16][component];
     for (int k = 0; k < 16; ++k) {
         double norm = 0.0, along = 0.0;
         for (int i = 0; i < ALL; ++i) norm += q[k][i] * q[k][i];

@@ -12,7 +12,7 @@
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 7350f00bd23d6c6841af14e1376c6d41632fc0c9a7016365409bc9edc3db3782
+# body-sha256: aca78cdec4288b8e87634549a9dc5e9fc51da2530f26a749ff94c62418380c60
 import numpy as np
 
 VERSION = "0.1.0"
@@ -77,8 +77,8 @@ def _prepare(parameters, h):
 
 
 def _generate(coef, y):
-    """P = grad s_h(y), and the jacobian 1 - hess s_h(y) pi(y) / 2 of the equation for p, up to
-    o(h^2)."""
+    """P = grad S_h(y), and the Jacobian 1 - Hess S_h(y) pi(y) / 2 of the equation for p, up to
+    O(h^2)."""
     theta = y[..., 0]
     p = y[..., 1]
     t1 = np.sin(theta)
@@ -344,21 +344,21 @@ def integrate(x0, h, steps, stride=1, gauge=None, **parameters):
 
 
 def _energy(parameters, x):
-    """The hamiltonian."""
+    """The Hamiltonian."""
     p = x[..., 1]
     V = x[..., 2]
     return _filled(x, [V + 0.5 * (p * p)])
 
 
 def _casimirs(parameters, x):
-    """The casimirs."""
+    """The Casimirs."""
     theta = x[..., 0]
     V = x[..., 2]
     return _filled(x, [V + np.cos(theta)])
 
 
 def _vector_field(parameters, x):
-    """Pi(x) grad h(x)."""
+    """Pi(x) grad H(x)."""
     theta = x[..., 0]
     p = x[..., 1]
     t1 = np.sin(theta)

@@ -12,7 +12,7 @@
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: e7d23ebd6f1df71129d4c29b2132c00e68e58d498c8054772384b4e3d743d906
+# body-sha256: 7bcc870807981e91f8c2b717db64ab141ea3ceeda3d232d814feccf33fe36d48
 import numpy as np
 
 VERSION = "0.1.0"
@@ -111,8 +111,8 @@ def _prepare(parameters, h):
 
 
 def _linearise(coef, y):
-    """At the point y: displacement alpha - y, increment beta - alpha, the jacobian of alpha and that of
-    the increment, all with the momenta p = grad s_h(y)."""
+    """At the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of
+    the increment, all with the momenta p = grad S_h(y)."""
     q = y[..., 0]
     p = y[..., 1]
     t1 = np.sin(q)
@@ -157,7 +157,7 @@ def _attempt(coef, x, carry, y):
     """Solve (y - x) + displacement(y) = 0 for y by Newton's method, and advance; arrays (members, DIM).
 
     The increment is corrected to first order by the last Newton correction, which is accepted when the error that
-    remains, quadratic in it, is below 1e-17. Returns new x, carry, y, and a status for each member,
+    remains, quadratic in it, is below 1e-18. Returns new x, carry, y, and a status for each member,
     "" if good.
     """
     x, carry, y = x.copy(), carry.copy(), y.copy()
@@ -174,7 +174,7 @@ def _attempt(coef, x, carry, y):
         y[open_] -= delta
         remaining = size**2 * np.maximum(1.0, size / previous[open_] ** 2)
         # The second test: corrections no longer shrink, the solve has reached the level of rounding.
-        done = (remaining <= 1e-17) | ((previous[open_] < 1e-8) & (size > 0.25 * previous[open_]))
+        done = (remaining <= 1e-18) | ((previous[open_] < 1e-8) & (size > 0.25 * previous[open_]))
         change = increment - (increment_jacobian @ delta[..., np.newaxis])[..., 0]
         total, rest = _sum(x[open_], carry[open_], change)
         good = done & np.isfinite(total).all(axis=-1)
@@ -268,7 +268,7 @@ def integrate(x0, h, steps, stride=1, gauge=None, **parameters):
 
 
 def _energy(parameters, x):
-    """The hamiltonian."""
+    """The Hamiltonian."""
     g = parameters["g"]
     q = x[..., 0]
     p = x[..., 1]
@@ -276,12 +276,12 @@ def _energy(parameters, x):
 
 
 def _casimirs(parameters, x):
-    """The casimirs."""
+    """The Casimirs."""
     return _filled(x, [])
 
 
 def _vector_field(parameters, x):
-    """Pi(x) grad h(x)."""
+    """Pi(x) grad H(x)."""
     g = parameters["g"]
     q = x[..., 0]
     p = x[..., 1]

@@ -12,7 +12,7 @@
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: da25d063a7d54318346e31aa2ae8e22b0b489b1a1371186906cb0886bfa2cbdf
+# body-sha256: 4679a9af95cc302dbbf5f4d45b3b037b69c2ef268795572b24c571ff7d92140e
 import numpy as np
 
 VERSION = "0.1.0"
@@ -161,7 +161,7 @@ def integrate(x0, h, steps, stride=1, gauge=None, **parameters):
 
 
 def _energy(parameters, x):
-    """The hamiltonian."""
+    """The Hamiltonian."""
     g = parameters["g"]
     q = x[..., 0]
     p = x[..., 1]
@@ -169,12 +169,12 @@ def _energy(parameters, x):
 
 
 def _casimirs(parameters, x):
-    """The casimirs."""
+    """The Casimirs."""
     return _filled(x, [])
 
 
 def _vector_field(parameters, x):
-    """Pi(x) grad h(x)."""
+    """Pi(x) grad H(x)."""
     g = parameters["g"]
     q = x[..., 0]
     p = x[..., 1]

@@ -5,7 +5,7 @@
  *   bi-realisation: log-canonical, symmetric
  *   generating function: S_1 ... S_3 (collected polynomial, 21 terms)
  *   step: implicit, Newton iteration with the analytic matrix
- *   one Newton iteration: 84 additions, 143 multiplications, 4 divisions, 6 functions
+ *   one Newton iteration: 90 additions, 159 multiplications, 4 divisions, 2 functions
  *
  * spec: predator_prey, sha256 756f4a9cb0ed0e328b63a51b2d6b8dddeb1b3f43ed6e5f1477d35affb9e83153
  * to regenerate: phigen build predator_prey.yaml
@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 6c8cd5f7e6e9350e597f8bdf0ff934d333b5078d547f660f98fb9753f67a53c3
+ * body-sha256: 22f66e04088d7864f1b987abc0733d577e0177abe4267c2a43c93099f225041d
  */
 #include "predator_prey.h"
 
@@ -124,55 +124,61 @@ static void predator_prey_linearise(const double coef[47], const double y[2], do
     const double t7 = coef[30] + t1 * t6;
     const double t8 = coef[29] + t1 * t7;
     const double p_predator = coef[28] + coef[27] * t1 + prey * (prey * (coef[37] + coef[38] * t1 + t2 * (coef[40] + coef[23] * t1 + t2 * (coef[42] + coef[43] * t1))) + predator * t8);
-    const double t9 = (-0.5) * (predator * p_predator);
-    const double t10 = exp(t9);
-    const double t11 = t10 - 1.0;
-    const double t12 = coef[7] + coef[9] * t1;
-    const double t13 = coef[3] + coef[4] * t1 + t2 * t12;
-    const double t14 = coef[2] + coef[5] * t2 + t1 * t13;
-    const double t15 = coef[8] + coef[10] * t1;
-    const double t16 = coef[6] + t1 * t15;
-    const double t17 = coef[25] + t4;
-    const double t18 = coef[24] + t1 * t17;
-    const double t19 = coef[18] + coef[20] * t1 + predator * t18;
-    const double t20 = coef[14] + t2 * t19;
-    const double t21 = coef[17] + coef[19] * t1 + predator * t16 + prey * t20;
-    const double t22 = coef[13] + t2 * t21;
-    const double t23 = coef[11] + t2 * t22;
-    const double t24 = predator * t14 + prey * t23;
-    const double p_prey = coef[1] + coef[0] * t2 + predator * t24;
-    const double t25 = 0.5 * (prey * p_prey);
-    const double t26 = exp(t25);
-    const double t27 = t26 - 1.0;
-    const double t28 = sinh(t9);
-    const double t29 = sinh(t25);
-    const double t30 = 1.0 / (predator * predator);
-    const double t31 = coef[26] * t30;
-    const double t32 = t16 - predator * (t1 * (coef[10] * t30) + t30 * t15) - coef[19] * t30 + prey * (t2 * (t18 - predator * (t1 * t31 + t30 * t17) - coef[20] * t30));
-    const double t33 = predator * (t14 - predator * (t1 * (coef[4] * t30 + t2 * (coef[9] * t30)) + t30 * t13) + prey * (t2 * (t2 * t32))) + t24;
-    const double t34 = prey * (predator * t10);
-    const double t35 = t1 * (t1 * (t5 - predator * (t30 * t3 + t2 * (coef[36] * t30 + prey * (coef[15] * t30 + t2 * t31)))) - t30 * t6);
-    const double t36 = prey * (t8 + predator * (t35 - t30 * t7) - prey * (coef[38] * t30 + t2 * (coef[23] * t30 + t2 * (coef[43] * t30)))) - coef[27] * t30;
-    const double t37 = 1.0 / (prey * prey);
-    const double t38 = t23 + prey * (t2 * (t2 * (t20 - prey * (t37 * t19)) - t37 * t21) - t37 * t22) - predator * (coef[5] * t37 + t1 * (t37 * t12));
-    const double t39 = predator * t38 - coef[0] * t37;
-    const double t40 = predator * (prey * t26);
-    const double t41 = cosh(t9);
-    const double t42 = prey * (predator * t41);
-    const double t43 = cosh(t25);
-    const double t44 = predator * (prey * t43);
-    displacement[0] = prey * t11;
-    displacement[1] = predator * t27;
-    increment[0] = (-2.0) * (prey * t28);
-    increment[1] = (-2.0) * (predator * t29);
-    jacobian[0] = 1.0 + (t11 - 0.5 * (t33 * t34));
-    jacobian[1] = (-0.5) * (prey * (p_predator * t10)) - 0.5 * (t36 * t34);
-    jacobian[2] = 0.5 * (predator * (p_prey * t26)) + 0.5 * (t39 * t40);
-    jacobian[3] = 1.0 + (t27 + 0.5 * (t33 * t40));
-    increment_jacobian[0] = t33 * t42 - 2.0 * t28;
-    increment_jacobian[1] = prey * (p_predator * t41) + t36 * t42;
-    increment_jacobian[2] = -(predator * (p_prey * t43) + t39 * t44);
-    increment_jacobian[3] = (-2.0) * t29 - t33 * t44;
+    const double t9 = expm1((-0.5) * (predator * p_predator));
+    const double t10 = coef[7] + coef[9] * t1;
+    const double t11 = coef[3] + coef[4] * t1 + t2 * t10;
+    const double t12 = coef[2] + coef[5] * t2 + t1 * t11;
+    const double t13 = coef[8] + coef[10] * t1;
+    const double t14 = coef[6] + t1 * t13;
+    const double t15 = coef[25] + t4;
+    const double t16 = coef[24] + t1 * t15;
+    const double t17 = coef[18] + coef[20] * t1 + predator * t16;
+    const double t18 = coef[14] + t2 * t17;
+    const double t19 = coef[17] + coef[19] * t1 + predator * t14 + prey * t18;
+    const double t20 = coef[13] + t2 * t19;
+    const double t21 = coef[11] + t2 * t20;
+    const double t22 = predator * t12 + prey * t21;
+    const double p_prey = coef[1] + coef[0] * t2 + predator * t22;
+    const double t23 = expm1(0.5 * (prey * p_prey));
+    const double t24 = 1.0 + t9;
+    const double t25 = 1.0 / t24;
+    const double t26 = 1.0 + t25;
+    const double t27 = t9 * t26;
+    const double t28 = 1.0 + t23;
+    const double t29 = 1.0 / t28;
+    const double t30 = 1.0 + t29;
+    const double t31 = t23 * t30;
+    const double t32 = t1 * t1;
+    const double t33 = coef[26] * t32;
+    const double t34 = t14 - predator * (t1 * (coef[10] * t32) + t32 * t13) - coef[19] * t32 + prey * (t2 * (t16 - predator * (t1 * t33 + t32 * t15) - coef[20] * t32));
+    const double t35 = predator * (t12 - predator * (t1 * (coef[4] * t32 + t2 * (coef[9] * t32)) + t32 * t11) + prey * (t2 * (t2 * t34))) + t22;
+    const double t36 = predator * t24;
+    const double t37 = prey * t36;
+    const double t38 = p_predator * t24;
+    const double t39 = t1 * (t1 * (t5 - predator * (t32 * t3 + t2 * (coef[36] * t32 + prey * (coef[15] * t32 + t2 * t33)))) - t32 * t6);
+    const double t40 = prey * (t8 + predator * (t39 - t32 * t7) - prey * (coef[38] * t32 + t2 * (coef[23] * t32 + t2 * (coef[43] * t32)))) - coef[27] * t32;
+    const double t41 = p_prey * t28;
+    const double t42 = t2 * t2;
+    const double t43 = t21 + prey * (t2 * (t2 * (t18 - prey * (t42 * t17)) - t42 * t19) - t42 * t20) - predator * (coef[5] * t42 + t1 * (t42 * t10));
+    const double t44 = predator * t43 - coef[0] * t42;
+    const double t45 = prey * t28;
+    const double t46 = predator * t45;
+    const double t47 = t25 * t25;
+    const double t48 = prey * (0.5 * (t9 * (t47 * t36)) - 0.5 * (t36 * t26));
+    const double t49 = t29 * t29;
+    const double t50 = predator * (0.5 * (t45 * t30) - 0.5 * (t23 * (t45 * t49)));
+    displacement[0] = prey * t9;
+    displacement[1] = predator * t23;
+    increment[0] = -(prey * t27);
+    increment[1] = -(predator * t31);
+    jacobian[0] = 1.0 + (t9 - 0.5 * (t35 * t37));
+    jacobian[1] = (-0.5) * (prey * t38) - 0.5 * (t40 * t37);
+    jacobian[2] = 0.5 * (predator * t41) + 0.5 * (t44 * t46);
+    jacobian[3] = 1.0 + (t23 + 0.5 * (t35 * t46));
+    increment_jacobian[0] = -(t27 + t35 * t48);
+    increment_jacobian[1] = -(prey * (0.5 * (t9 * (t47 * t38)) - 0.5 * (t38 * t26)) + t40 * t48);
+    increment_jacobian[2] = -(predator * (0.5 * (t41 * t30) - 0.5 * (t23 * (t41 * t49))) + t44 * t50);
+    increment_jacobian[3] = -(t31 + t35 * t50);
 }
 
 /* Solve matrix * solution = side, both overwritten, by elimination with partial pivoting. 0 if singular. */
@@ -263,12 +269,12 @@ static void predator_prey_predict(predator_prey_memory *memory, double value[2])
     for (int k = 0; k < memory->guess; ++k)
         for (int i = 0; i < 2; ++i) guess[0][i] += memory->lag[k][i];
     if (memory->trained) {
+        const int last = memory->count - 1;
         double odd[2] = { 0.0 };
-        const double(*past)[2] = memory->past + memory->count - 16;
         for (int k = 0; k < 16; k += 2)
             for (int i = 0; i < 2; ++i) {
-                guess[1][i] += memory->weight[k][i] * past[16 - 1 - k][i];
-                odd[i] += memory->weight[k + 1][i] * past[16 - 2 - k][i];
+                guess[1][i] += memory->weight[k][i] * memory->past[last - k][i];
+                odd[i] += memory->weight[k + 1][i] * memory->past[last - 1 - k][i];
             }
         for (int i = 0; i < 2; ++i) guess[1][i] += odd[i];
     }
@@ -281,15 +287,15 @@ static void predator_prey_train(predator_prey_memory *memory, int component)
 {
     enum { ROWS = 80 - 16, ALL = 80 };
     double q[16][ALL], r[16][16], b[ALL] = { 0.0 }, largest = 0.0;
-    const double(*past)[2] = memory->past + memory->count - 80;
+    const int first = memory->count - 80;
     memset(q, 0, sizeof q);
     for (int i = 0; i < 80; ++i)
-        if (fabs(past[i][component]) > largest) largest = fabs(past[i][component]);
+        if (fabs(memory->past[first + i][component]) > largest) largest = fabs(memory->past[first + i][component]);
     for (int k = 0; k < 16; ++k) {
-        for (int i = 0; i < ROWS; ++i) q[k][i] = past[i + 16 - 1 - k][component];
+        for (int i = 0; i < ROWS; ++i) q[k][i] = memory->past[first + i + 16 - 1 - k][component];
         q[k][ROWS + k] = 1e-13 * largest;
     }
-    for (int i = 0; i < ROWS; ++i) b[i] = past[i + 16][component];
+    for (int i = 0; i < ROWS; ++i) b[i] = memory->past[first + i + 16][component];
     for (int k = 0; k < 16; ++k) {
         double norm = 0.0, along = 0.0;
         for (int i = 0; i < ALL; ++i) norm += q[k][i] * q[k][i];
@@ -367,7 +373,7 @@ static double predator_prey_size(const double y[2], const double delta[2])
 
 /* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the extrapolated guess, and advance. The
    increment is corrected to first order by the last Newton correction, so that correction costs no evaluation:
-   a correction is accepted when the error that remains after it, quadratic in it, is below 1e-17. */
+   a correction is accepted when the error that remains after it, quadratic in it, is below 1e-18. */
 static predator_prey_status predator_prey_attempt(predator_prey_solver *s, int stage)
 {
     const double *coef = s->coef[stage];
@@ -389,7 +395,7 @@ static predator_prey_status predator_prey_attempt(predator_prey_solver *s, int s
         const double growth = size / (previous * previous);
         const double remaining = size * size * (growth > 1.0 ? growth : 1.0);
         /* The second test: corrections no longer shrink, the solve has reached the level of rounding. */
-        if (remaining <= 1e-17 || (previous < 1e-8 && size > 0.25 * previous)) {
+        if (remaining <= 1e-18 || (previous < 1e-8 && size > 0.25 * previous)) {
             double offset[2];
             for (int i = 0; i < 2; ++i) {
                 offset[i] = y[i] - s->x[i];

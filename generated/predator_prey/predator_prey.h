@@ -5,7 +5,7 @@
  *   bi-realisation: log-canonical, symmetric
  *   generating function: S_1 ... S_3 (collected polynomial, 21 terms)
  *   step: implicit, Newton iteration with the analytic matrix
- *   one Newton iteration: 84 additions, 143 multiplications, 4 divisions, 6 functions
+ *   one Newton iteration: 90 additions, 159 multiplications, 4 divisions, 2 functions
  *
  * spec: predator_prey, sha256 756f4a9cb0ed0e328b63a51b2d6b8dddeb1b3f43ed6e5f1477d35affb9e83153
  * to regenerate: phigen build predator_prey.yaml

@@ -4,7 +4,7 @@
 #   bi-realisation: log-canonical, symmetric
 #   generating function: S_1 ... S_3 (collected polynomial, 21 terms)
 #   step: implicit, Newton iteration with the analytic matrix
-#   one Newton iteration: 84 additions, 143 multiplications, 4 divisions, 6 functions
+#   one Newton iteration: 90 additions, 159 multiplications, 4 divisions, 2 functions
 #
 # spec: predator_prey, sha256 756f4a9cb0ed0e328b63a51b2d6b8dddeb1b3f43ed6e5f1477d35affb9e83153
 # to regenerate: phigen build predator_prey.yaml
@@ -12,7 +12,7 @@
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: dd02fb283210dacb277490ac8da479b00dc672591cdc256a97737c77a7401cf8
+# body-sha256: a601df1482cad4ffd0bdc81e1d265538badb9625c424dc32615322bec65b3633
 import numpy as np
 
 VERSION = "0.1.0"
@@ -162,8 +162,8 @@ def _prepare(parameters, h):
 
 
 def _linearise(coef, y):
-    """At the point y: displacement alpha - y, increment beta - alpha, the jacobian of alpha and that of
-    the increment, all with the momenta p = grad s_h(y)."""
+    """At the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of
+    the increment, all with the momenta p = grad S_h(y)."""
     prey = y[..., 0]
     predator = y[..., 1]
     t1 = 1.0 / predator
@@ -175,57 +175,63 @@ def _linearise(coef, y):
     t7 = coef[30] + t1 * t6
     t8 = coef[29] + t1 * t7
     p_predator = coef[28] + coef[27] * t1 + prey * (prey * (coef[37] + coef[38] * t1 + t2 * (coef[40] + coef[23] * t1 + t2 * (coef[42] + coef[43] * t1))) + predator * t8)
-    t9 = (-0.5) * (predator * p_predator)
-    t10 = np.exp(t9)
-    t11 = t10 - 1.0
-    t12 = coef[7] + coef[9] * t1
-    t13 = coef[3] + coef[4] * t1 + t2 * t12
-    t14 = coef[2] + coef[5] * t2 + t1 * t13
-    t15 = coef[8] + coef[10] * t1
-    t16 = coef[6] + t1 * t15
-    t17 = coef[25] + t4
-    t18 = coef[24] + t1 * t17
-    t19 = coef[18] + coef[20] * t1 + predator * t18
-    t20 = coef[14] + t2 * t19
-    t21 = coef[17] + coef[19] * t1 + predator * t16 + prey * t20
-    t22 = coef[13] + t2 * t21
-    t23 = coef[11] + t2 * t22
-    t24 = predator * t14 + prey * t23
-    p_prey = coef[1] + coef[0] * t2 + predator * t24
-    t25 = 0.5 * (prey * p_prey)
-    t26 = np.exp(t25)
-    t27 = t26 - 1.0
-    t28 = np.sinh(t9)
-    t29 = np.sinh(t25)
-    t30 = 1.0 / (predator * predator)
-    t31 = coef[26] * t30
-    t32 = t16 - predator * (t1 * (coef[10] * t30) + t30 * t15) - coef[19] * t30 + prey * (t2 * (t18 - predator * (t1 * t31 + t30 * t17) - coef[20] * t30))
-    t33 = predator * (t14 - predator * (t1 * (coef[4] * t30 + t2 * (coef[9] * t30)) + t30 * t13) + prey * (t2 * (t2 * t32))) + t24
-    t34 = prey * (predator * t10)
-    t35 = t1 * (t1 * (t5 - predator * (t30 * t3 + t2 * (coef[36] * t30 + prey * (coef[15] * t30 + t2 * t31)))) - t30 * t6)
-    t36 = prey * (t8 + predator * (t35 - t30 * t7) - prey * (coef[38] * t30 + t2 * (coef[23] * t30 + t2 * (coef[43] * t30)))) - coef[27] * t30
-    t37 = 1.0 / (prey * prey)
-    t38 = t23 + prey * (t2 * (t2 * (t20 - prey * (t37 * t19)) - t37 * t21) - t37 * t22) - predator * (coef[5] * t37 + t1 * (t37 * t12))
-    t39 = predator * t38 - coef[0] * t37
-    t40 = predator * (prey * t26)
-    t41 = np.cosh(t9)
-    t42 = prey * (predator * t41)
-    t43 = np.cosh(t25)
-    t44 = predator * (prey * t43)
+    t9 = np.expm1((-0.5) * (predator * p_predator))
+    t10 = coef[7] + coef[9] * t1
+    t11 = coef[3] + coef[4] * t1 + t2 * t10
+    t12 = coef[2] + coef[5] * t2 + t1 * t11
+    t13 = coef[8] + coef[10] * t1
+    t14 = coef[6] + t1 * t13
+    t15 = coef[25] + t4
+    t16 = coef[24] + t1 * t15
+    t17 = coef[18] + coef[20] * t1 + predator * t16
+    t18 = coef[14] + t2 * t17
+    t19 = coef[17] + coef[19] * t1 + predator * t14 + prey * t18
+    t20 = coef[13] + t2 * t19
+    t21 = coef[11] + t2 * t20
+    t22 = predator * t12 + prey * t21
+    p_prey = coef[1] + coef[0] * t2 + predator * t22
+    t23 = np.expm1(0.5 * (prey * p_prey))
+    t24 = 1.0 + t9
+    t25 = 1.0 / t24
+    t26 = 1.0 + t25
+    t27 = t9 * t26
+    t28 = 1.0 + t23
+    t29 = 1.0 / t28
+    t30 = 1.0 + t29
+    t31 = t23 * t30
+    t32 = t1 * t1
+    t33 = coef[26] * t32
+    t34 = t14 - predator * (t1 * (coef[10] * t32) + t32 * t13) - coef[19] * t32 + prey * (t2 * (t16 - predator * (t1 * t33 + t32 * t15) - coef[20] * t32))
+    t35 = predator * (t12 - predator * (t1 * (coef[4] * t32 + t2 * (coef[9] * t32)) + t32 * t11) + prey * (t2 * (t2 * t34))) + t22
+    t36 = predator * t24
+    t37 = prey * t36
+    t38 = p_predator * t24
+    t39 = t1 * (t1 * (t5 - predator * (t32 * t3 + t2 * (coef[36] * t32 + prey * (coef[15] * t32 + t2 * t33)))) - t32 * t6)
+    t40 = prey * (t8 + predator * (t39 - t32 * t7) - prey * (coef[38] * t32 + t2 * (coef[23] * t32 + t2 * (coef[43] * t32)))) - coef[27] * t32
+    t41 = p_prey * t28
+    t42 = t2 * t2
+    t43 = t21 + prey * (t2 * (t2 * (t18 - prey * (t42 * t17)) - t42 * t19) - t42 * t20) - predator * (coef[5] * t42 + t1 * (t42 * t10))
+    t44 = predator * t43 - coef[0] * t42
+    t45 = prey * t28
+    t46 = predator * t45
+    t47 = t25 * t25
+    t48 = prey * (0.5 * (t9 * (t47 * t36)) - 0.5 * (t36 * t26))
+    t49 = t29 * t29
+    t50 = predator * (0.5 * (t45 * t30) - 0.5 * (t23 * (t45 * t49)))
     return (
-        _filled(y, [prey * t11, predator * t27]),
-        _filled(y, [(-2.0) * (prey * t28), (-2.0) * (predator * t29)]),
+        _filled(y, [prey * t9, predator * t23]),
+        _filled(y, [-(prey * t27), -(predator * t31)]),
         _filled(y, [
-            1.0 + (t11 - 0.5 * (t33 * t34)),
-            (-0.5) * (prey * (p_predator * t10)) - 0.5 * (t36 * t34),
-            0.5 * (predator * (p_prey * t26)) + 0.5 * (t39 * t40),
-            1.0 + (t27 + 0.5 * (t33 * t40)),
+            1.0 + (t9 - 0.5 * (t35 * t37)),
+            (-0.5) * (prey * t38) - 0.5 * (t40 * t37),
+            0.5 * (predator * t41) + 0.5 * (t44 * t46),
+            1.0 + (t23 + 0.5 * (t35 * t46)),
         ]).reshape(y.shape + (2,)),
         _filled(y, [
-            t33 * t42 - 2.0 * t28,
-            prey * (p_predator * t41) + t36 * t42,
-            -(predator * (p_prey * t43) + t39 * t44),
-            (-2.0) * t29 - t33 * t44,
+            -(t27 + t35 * t48),
+            -(prey * (0.5 * (t9 * (t47 * t38)) - 0.5 * (t38 * t26)) + t40 * t48),
+            -(predator * (0.5 * (t41 * t30) - 0.5 * (t23 * (t41 * t49))) + t44 * t50),
+            -(t31 + t35 * t50),
         ]).reshape(y.shape + (2,)),
     )
 
@@ -250,7 +256,7 @@ def _attempt(coef, x, carry, y):
     """Solve (y - x) + displacement(y) = 0 for y by Newton's method, and advance; arrays (members, DIM).
 
     The increment is corrected to first order by the last Newton correction, which is accepted when the error that
-    remains, quadratic in it, is below 1e-17. Returns new x, carry, y, and a status for each member,
+    remains, quadratic in it, is below 1e-18. Returns new x, carry, y, and a status for each member,
     "" if good.
     """
     x, carry, y = x.copy(), carry.copy(), y.copy()
@@ -267,7 +273,7 @@ def _attempt(coef, x, carry, y):
         y[open_] -= delta
         remaining = size**2 * np.maximum(1.0, size / previous[open_] ** 2)
         # The second test: corrections no longer shrink, the solve has reached the level of rounding.
-        done = (remaining <= 1e-17) | ((previous[open_] < 1e-8) & (size > 0.25 * previous[open_]))
+        done = (remaining <= 1e-18) | ((previous[open_] < 1e-8) & (size > 0.25 * previous[open_]))
         change = increment - (increment_jacobian @ delta[..., np.newaxis])[..., 0]
         total, rest = _sum(x[open_], carry[open_], change)
         good = done & np.isfinite(total).all(axis=-1)
@@ -361,7 +367,7 @@ def integrate(x0, h, steps, stride=1, gauge=None, **parameters):
 
 
 def _energy(parameters, x):
-    """The hamiltonian."""
+    """The Hamiltonian."""
     growth = parameters["growth"]
     attack = parameters["attack"]
     gain = parameters["gain"]
@@ -372,12 +378,12 @@ def _energy(parameters, x):
 
 
 def _casimirs(parameters, x):
-    """The casimirs."""
+    """The Casimirs."""
     return _filled(x, [])
 
 
 def _vector_field(parameters, x):
-    """Pi(x) grad h(x)."""
+    """Pi(x) grad H(x)."""
     growth = parameters["growth"]
     attack = parameters["attack"]
     gain = parameters["gain"]

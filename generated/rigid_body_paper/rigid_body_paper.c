@@ -7,13 +7,13 @@
  *   step: implicit, Newton iteration with the analytic matrix
  *   one Newton iteration: 61 additions, 87 multiplications, 2 functions
  *
- * spec: rigid_body_paper, sha256 44868bbe45133c697d8e1a9e4a4b45b97b01e9d8ed9fb3181d29809a30ef1f4a
+ * spec: rigid_body_paper, sha256 252e63a465020d4f81a0a44276c75edbb523615ce0cb4a3efc6ebf0241578d2e
  * to regenerate: phigen build rigid_body_paper.yaml
  * DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 03c0c3c6388094e2a158494a8129e7aa64989c3852048c33ed56f2ca17ea9dae
+ * body-sha256: f625e2bdf1e9f152853efad593ef2a671b2b22b68d01ececf97dacc9a043daf1
  */
 #include "rigid_body_paper.h"
 
@@ -296,12 +296,12 @@ static void rigid_body_paper_predict(rigid_body_paper_memory *memory, double val
     for (int k = 0; k < memory->guess; ++k)
         for (int i = 0; i < 3; ++i) guess[0][i] += memory->lag[k][i];
     if (memory->trained) {
+        const int last = memory->count - 1;
         double odd[3] = { 0.0 };
-        const double(*past)[3] = memory->past + memory->count - 16;
         for (int k = 0; k < 16; k += 2)
             for (int i = 0; i < 3; ++i) {
-                guess[1][i] += memory->weight[k][i] * past[16 - 1 - k][i];
-                odd[i] += memory->weight[k + 1][i] * past[16 - 2 - k][i];
+                guess[1][i] += memory->weight[k][i] * memory->past[last - k][i];
+                odd[i] += memory->weight[k + 1][i] * memory->past[last - 1 - k][i];
             }
         for (int i = 0; i < 3; ++i) guess[1][i] += odd[i];
     }
@@ -314,15 +314,15 @@ static void rigid_body_paper_train(rigid_body_paper_memory *memory, int componen
 {
     enum { ROWS = 80 - 16, ALL = 80 };
     double q[16][ALL], r[16][16], b[ALL] = { 0.0 }, largest = 0.0;
-    const double(*past)[3] = memory->past + memory->count - 80;
+    const int first = memory->count - 80;
     memset(q, 0, sizeof q);
     for (int i = 0; i < 80; ++i)
-        if (fabs(past[i][component]) > largest) largest = fabs(past[i][component]);
+        if (fabs(memory->past[first + i][component]) > largest) largest = fabs(memory->past[first + i][component]);
     for (int k = 0; k < 16; ++k) {
-        for (int i = 0; i < ROWS; ++i) q[k][i] = past[i + 16 - 1 - k][component];
+        for (int i = 0; i < ROWS; ++i) q[k][i] = memory->past[first + i + 16 - 1 - k][component];
         q[k][ROWS + k] = 1e-13 * largest;
     }
-    for (int i = 0; i < ROWS; ++i) b[i] = past[i + 16][component];
+    for (int i = 0; i < ROWS; ++i) b[i] = memory->past[first + i + 16][component];
     for (int k = 0; k < 16; ++k) {
         double norm = 0.0, along = 0.0;
         for (int i = 0; i < ALL; ++i) norm += q[k][i] * q[k][i];
@@ -401,7 +401,7 @@ static double rigid_body_paper_size(const double y[3], const double delta[3])
 
 /* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the extrapolated guess, and advance. The
    increment is corrected to first order by the last Newton correction, so that correction costs no evaluation:
-   a correction is accepted when the error that remains after it, quadratic in it, is below 1e-17. */
+   a correction is accepted when the error that remains after it, quadratic in it, is below 1e-18. */
 static rigid_body_paper_status rigid_body_paper_attempt(rigid_body_paper_solver *s, int stage)
 {
     const double *coef = s->coef[stage];
@@ -423,7 +423,7 @@ static rigid_body_paper_status rigid_body_paper_attempt(rigid_body_paper_solver 
         const double growth = size / (previous * previous);
         const double remaining = size * size * (growth > 1.0 ? growth : 1.0);
         /* The second test: corrections no longer shrink, the solve has reached the level of rounding. */
-        if (remaining <= 1e-17 || (previous < 1e-8 && size > 0.25 * previous)) {
+        if (remaining <= 1e-18 || (previous < 1e-8 && size > 0.25 * previous)) {
             double offset[3];
             for (int i = 0; i < 3; ++i) {
                 offset[i] = y[i] - s->x[i];

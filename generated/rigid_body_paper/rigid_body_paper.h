@@ -7,13 +7,13 @@
  *   step: implicit, Newton iteration with the analytic matrix
  *   one Newton iteration: 61 additions, 87 multiplications, 2 functions
  *
- * spec: rigid_body_paper, sha256 44868bbe45133c697d8e1a9e4a4b45b97b01e9d8ed9fb3181d29809a30ef1f4a
+ * spec: rigid_body_paper, sha256 252e63a465020d4f81a0a44276c75edbb523615ce0cb4a3efc6ebf0241578d2e
  * to regenerate: phigen build rigid_body_paper.yaml
  * DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 4b2edc105208ccba21cc6dd0ffcb19e592628a6bf1257f02b6accd900a0f7cbd
+ * body-sha256: fb5ebb2823ce6f1953645ff654571b6212c8aa84c05974dc6e4be75b6d17c4f9
  */
 #ifndef RIGID_BODY_PAPER_H
 #define RIGID_BODY_PAPER_H
@@ -28,7 +28,7 @@ extern "C" {
 #define rigid_body_paper_ORDER 2
 #define rigid_body_paper_CASIMIRS 1
 #define rigid_body_paper_PHIGEN_VERSION "0.1.0"
-#define rigid_body_paper_SPEC_SHA256 "44868bbe45133c697d8e1a9e4a4b45b97b01e9d8ed9fb3181d29809a30ef1f4a"
+#define rigid_body_paper_SPEC_SHA256 "252e63a465020d4f81a0a44276c75edbb523615ce0cb4a3efc6ebf0241578d2e"
 
 /* State vectors are in the order of the spec: x1 = x[0], x2 = x[1], x3 = x[2]. */
 

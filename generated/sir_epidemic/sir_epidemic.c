@@ -5,7 +5,7 @@
  *   bi-realisation: karasev, symmetric
  *   generating function: S_1 ... S_3 (collected polynomial, 4 terms)
  *   step: implicit in p, each path followed by its Taylor series to round-off
- *   one evaluation of the equation for p: 2 additions, 13 multiplications, 2 divisions
+ *   one evaluation of the equation for p: 2 additions, 14 multiplications, 1 divisions
  *
  * spec: sir_epidemic, sha256 115b753136b45d645443f1dd70079639f2bd0e5420635c11a5444e91e153af93
  * to regenerate: phigen build sir_epidemic.yaml
@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: fd90f8d9cdfb9b0ceab0723c3ba4302bab64cb05d03bc78b70afc05a2f362387
+ * body-sha256: ef32827612813c4d592c282d358b604e94c7fbf08dfa2e2a2d3833736d7a3421
  */
 #include "sir_epidemic.h"
 
@@ -42,13 +42,13 @@ static void sir_epidemic_generate(const double coef[4], const double y[3], doubl
 {
     const double S = y[0];
     const double I_ = y[1];
-    const double t1 = S * S;
-    const double t2 = 1.0 / t1;
+    const double t1 = 1.0 / S;
+    const double t2 = t1 * t1;
     const double t3 = I_ * S;
     const double t4 = t3 * (coef[0] * t2);
     const double t5 = coef[2] * t3;
-    slope[0] = coef[1] + coef[0] / S;
-    slope[1] = coef[1] + coef[2] * (t2 * (I_ * t1));
+    slope[0] = coef[1] + coef[0] * t1;
+    slope[1] = coef[1] + coef[2] * (t2 * (I_ * (S * S)));
     slope[2] = 0.0;
     jacobian[0] = 1.0;
     jacobian[1] = 0.5 * t4;
@@ -157,12 +157,12 @@ static void sir_epidemic_predict(sir_epidemic_memory *memory, double value[3])
     for (int k = 0; k < memory->guess; ++k)
         for (int i = 0; i < 3; ++i) guess[0][i] += memory->lag[k][i];
     if (memory->trained) {
+        const int last = memory->count - 1;
         double odd[3] = { 0.0 };
-        const double(*past)[3] = memory->past + memory->count - 16;
         for (int k = 0; k < 16; k += 2)
             for (int i = 0; i < 3; ++i) {
-                guess[1][i] += memory->weight[k][i] * past[16 - 1 - k][i];
-                odd[i] += memory->weight[k + 1][i] * past[16 - 2 - k][i];
+                guess[1][i] += memory->weight[k][i] * memory->past[last - k][i];
+                odd[i] += memory->weight[k + 1][i] * memory->past[last - 1 - k][i];
             }
         for (int i = 0; i < 3; ++i) guess[1][i] += odd[i];
     }
@@ -175,15 +175,15 @@ static void sir_epidemic_train(sir_epidemic_memory *memory, int component)
 {
     enum { ROWS = 80 - 16, ALL = 80 };
     double q[16][ALL], r[16][16], b[ALL] = { 0.0 }, largest = 0.0;
-    const double(*past)[3] = memory->past + memory->count - 80;
+    const int first = memory->count - 80;
     memset(q, 0, sizeof q);
     for (int i = 0; i < 80; ++i)
-        if (fabs(past[i][component]) > largest) largest = fabs(past[i][component]);
+        if (fabs(memory->past[first + i][component]) > largest) largest = fabs(memory->past[first + i][component]);
     for (int k = 0; k < 16; ++k) {
-        for (int i = 0; i < ROWS; ++i) q[k][i] = past[i + 16 - 1 - k][component];
+        for (int i = 0; i < ROWS; ++i) q[k][i] = memory->past[first + i + 16 - 1 - k][component];
         q[k][ROWS + k] = 1e-13 * largest;
     }
-    for (int i = 0; i < ROWS; ++i) b[i] = past[i + 16][component];
+    for (int i = 0; i < ROWS; ++i) b[i] = memory->past[first + i + 16][component];
     for (int k = 0; k < 16; ++k) {
         double norm = 0.0, along = 0.0;
         for (int i = 0; i < ALL; ++i) norm += q[k][i] * q[k][i];

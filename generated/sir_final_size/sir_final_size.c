@@ -12,7 +12,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: fb2315715f0a50ca9fc52f77aa52715cb6bb876b04523c47351c154ee5366f23
+ * body-sha256: 9dcf7c76dc9e0725052c1965a20e09dd3656d3902c42483d97bd5053ac905600
  */
 #include "sir_final_size.h"
 
@@ -148,12 +148,12 @@ static void sir_final_size_predict(sir_final_size_memory *memory, double value[3
     for (int k = 0; k < memory->guess; ++k)
         for (int i = 0; i < 3; ++i) guess[0][i] += memory->lag[k][i];
     if (memory->trained) {
+        const int last = memory->count - 1;
         double odd[3] = { 0.0 };
-        const double(*past)[3] = memory->past + memory->count - 16;
         for (int k = 0; k < 16; k += 2)
             for (int i = 0; i < 3; ++i) {
-                guess[1][i] += memory->weight[k][i] * past[16 - 1 - k][i];
-                odd[i] += memory->weight[k + 1][i] * past[16 - 2 - k][i];
+                guess[1][i] += memory->weight[k][i] * memory->past[last - k][i];
+                odd[i] += memory->weight[k + 1][i] * memory->past[last - 1 - k][i];
             }
         for (int i = 0; i < 3; ++i) guess[1][i] += odd[i];
     }
@@ -166,15 +166,15 @@ static void sir_final_size_train(sir_final_size_memory *memory, int component)
 {
     enum { ROWS = 80 - 16, ALL = 80 };
     double q[16][ALL], r[16][16], b[ALL] = { 0.0 }, largest = 0.0;
-    const double(*past)[3] = memory->past + memory->count - 80;
+    const int first = memory->count - 80;
     memset(q, 0, sizeof q);
     for (int i = 0; i < 80; ++i)
-        if (fabs(past[i][component]) > largest) largest = fabs(past[i][component]);
+        if (fabs(memory->past[first + i][component]) > largest) largest = fabs(memory->past[first + i][component]);
     for (int k = 0; k < 16; ++k) {
-        for (int i = 0; i < ROWS; ++i) q[k][i] = past[i + 16 - 1 - k][component];
+        for (int i = 0; i < ROWS; ++i) q[k][i] = memory->past[first + i + 16 - 1 - k][component];
         q[k][ROWS + k] = 1e-13 * largest;
     }
-    for (int i = 0; i < ROWS; ++i) b[i] = past[i + 16][component];
+    for (int i = 0; i < ROWS; ++i) b[i] = memory->past[first + i + 16][component];
     for (int k = 0; k < 16; ++k) {
         double norm = 0.0, along = 0.0;
         for (int i = 0; i < ALL; ++i) norm += q[k][i] * q[k][i];

@@ -11,7 +11,7 @@
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 0c583abc88ec09690e9353380d7abe2f7af8113df918750b8a500513f5b07f1b
+# body-sha256: 5bff1e0864309630c3611a70425fd1ea417c643d63a43cda1c5ac1e53d8b1943
 import numpy as np
 
 VERSION = "0.1.0"
@@ -80,8 +80,8 @@ def _prepare(parameters, h):
 
 
 def _generate(coef, y):
-    """P = grad s_h(y), and the jacobian 1 - hess s_h(y) pi(y) / 2 of the equation for p, up to
-    o(h^2)."""
+    """P = grad S_h(y), and the Jacobian 1 - Hess S_h(y) pi(y) / 2 of the equation for p, up to
+    O(h^2)."""
     return (
         _filled(y, [coef[0], coef[0], coef[0]]),
         _filled(y, [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]).reshape(y.shape + (3,)),
@@ -342,7 +342,7 @@ def integrate(x0, h, steps, stride=1, gauge=None, **parameters):
 
 
 def _energy(parameters, x):
-    """The hamiltonian."""
+    """The Hamiltonian."""
     S = x[..., 0]
     I = x[..., 1]
     R = x[..., 2]
@@ -350,7 +350,7 @@ def _energy(parameters, x):
 
 
 def _casimirs(parameters, x):
-    """The casimirs."""
+    """The Casimirs."""
     beta = parameters["beta"]
     gamma = parameters["gamma"]
     S = x[..., 0]
@@ -359,7 +359,7 @@ def _casimirs(parameters, x):
 
 
 def _vector_field(parameters, x):
-    """Pi(x) grad h(x)."""
+    """Pi(x) grad H(x)."""
     beta = parameters["beta"]
     gamma = parameters["gamma"]
     S = x[..., 0]

@@ -12,7 +12,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: c1975b693d74985adb16814c5ff77243a8521488d21a33caab917cd2f9d1b4c0
+ * body-sha256: ea3de8676f7af1a396b311de7eed5b3049a689589894b3e7810d5e2a623a08f3
  */
 #include "toda3_quadratic.h"
 
@@ -130,12 +130,12 @@ static void toda3_quadratic_predict(toda3_quadratic_memory *memory, double value
     for (int k = 0; k < memory->guess; ++k)
         for (int i = 0; i < 5; ++i) guess[0][i] += memory->lag[k][i];
     if (memory->trained) {
+        const int last = memory->count - 1;
         double odd[5] = { 0.0 };
-        const double(*past)[5] = memory->past + memory->count - 16;
         for (int k = 0; k < 16; k += 2)
             for (int i = 0; i < 5; ++i) {
-                guess[1][i] += memory->weight[k][i] * past[16 - 1 - k][i];
-                odd[i] += memory->weight[k + 1][i] * past[16 - 2 - k][i];
+                guess[1][i] += memory->weight[k][i] * memory->past[last - k][i];
+                odd[i] += memory->weight[k + 1][i] * memory->past[last - 1 - k][i];
             }
         for (int i = 0; i < 5; ++i) guess[1][i] += odd[i];
     }
@@ -148,15 +148,15 @@ static void toda3_quadratic_train(toda3_quadratic_memory *memory, int component)
 {
     enum { ROWS = 80 - 16, ALL = 80 };
     double q[16][ALL], r[16][16], b[ALL] = { 0.0 }, largest = 0.0;
-    const double(*past)[5] = memory->past + memory->count - 80;
+    const int first = memory->count - 80;
     memset(q, 0, sizeof q);
     for (int i = 0; i < 80; ++i)
-        if (fabs(past[i][component]) > largest) largest = fabs(past[i][component]);
+        if (fabs(memory->past[first + i][component]) > largest) largest = fabs(memory->past[first + i][component]);
     for (int k = 0; k < 16; ++k) {
-        for (int i = 0; i < ROWS; ++i) q[k][i] = past[i + 16 - 1 - k][component];
+        for (int i = 0; i < ROWS; ++i) q[k][i] = memory->past[first + i + 16 - 1 - k][component];
         q[k][ROWS + k] = 1e-13 * largest;
     }
-    for (int i = 0; i < ROWS; ++i) b[i] = past[i + 16][component];
+    for (int i = 0; i < ROWS; ++i) b[i] = memory->past[first + i + 16][component];
     for (int k = 0; k < 16; ++k) {
         double norm = 0.0, along = 0.0;
         for (int i = 0; i < ALL; ++i) norm += q[k][i] * q[k][i];

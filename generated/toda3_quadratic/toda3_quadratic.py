@@ -11,7 +11,7 @@
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: bdf49d431804ea60c5330e37c8e017aeb3b64dd487560caede8652fe48b0d372
+# body-sha256: 64a91e61573d080128ed937e51bd4d9d50c4dc64ec9a1e387e7924438a5d8d06
 import numpy as np
 
 VERSION = "0.1.0"
@@ -76,8 +76,8 @@ def _prepare(parameters, h):
 
 
 def _generate(coef, y):
-    """P = grad s_h(y), and the jacobian 1 - hess s_h(y) pi(y) / 2 of the equation for p, up to
-    o(h^2)."""
+    """P = grad S_h(y), and the Jacobian 1 - Hess S_h(y) pi(y) / 2 of the equation for p, up to
+    O(h^2)."""
     return (
         _filled(y, [0.0, 0.0, coef[0], coef[0], coef[0]]),
         _filled(y, [
@@ -443,7 +443,7 @@ def integrate(x0, h, steps, stride=1, gauge=None, **parameters):
 
 
 def _energy(parameters, x):
-    """The hamiltonian."""
+    """The Hamiltonian."""
     b1 = x[..., 2]
     b2 = x[..., 3]
     b3 = x[..., 4]
@@ -451,7 +451,7 @@ def _energy(parameters, x):
 
 
 def _casimirs(parameters, x):
-    """The casimirs."""
+    """The Casimirs."""
     a1 = x[..., 0]
     a2 = x[..., 1]
     b1 = x[..., 2]
@@ -461,7 +461,7 @@ def _casimirs(parameters, x):
 
 
 def _vector_field(parameters, x):
-    """Pi(x) grad h(x)."""
+    """Pi(x) grad H(x)."""
     a1 = x[..., 0]
     a2 = x[..., 1]
     b1 = x[..., 2]

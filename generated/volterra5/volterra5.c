@@ -5,7 +5,7 @@
  *   bi-realisation: log-canonical, symmetric
  *   generating function: S_1 ... S_3 (collected polynomial, 20 terms)
  *   step: implicit, Newton iteration with the analytic matrix
- *   one Newton iteration: 143 additions, 295 multiplications, 15 functions
+ *   one Newton iteration: 168 additions, 375 multiplications, 5 divisions, 5 functions
  *
  * spec: volterra5, sha256 cfd60e7b7b6deffb6e5297d17c105b63a43ab52b9aeaa9bde72b05fd871e6d03
  * to regenerate: phigen build volterra5.yaml
@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 983507ae74e61c994749f4cd62c3eea78f213e8e9d838869d2f8c6f8e3d68680
+ * body-sha256: 515927a8181a2bc692aad605a8c843c23c117c0dc1adb06fa7366a95362b40b0
  */
 #include "volterra5.h"
 
@@ -63,137 +63,162 @@ static void volterra5_linearise(const double coef[4], const double y[5], double 
     const double t12 = t1 + (t10 + t11);
     const double p_v2 = v1 * (t9 + (t10 + t3)) + (coef[0] + v3 * t12);
     const double t13 = v2 * p_v2;
-    const double t14 = 0.5 * (t7 - t13);
-    const double t15 = exp(t14);
-    const double t16 = t15 - 1.0;
-    const double t17 = coef[3] * v1;
-    const double t18 = coef[1] * v2;
-    const double t19 = t9 + (t17 + t18);
-    const double t20 = coef[1] * v5;
-    const double t21 = t20 + (t17 + t1);
-    const double p_v1 = v2 * t19 + (coef[0] + v5 * t21);
-    const double t22 = v1 * p_v1;
-    const double t23 = coef[3] * v3;
-    const double t24 = coef[2] * v1;
-    const double t25 = t8 + (t5 + t23);
-    const double p_v3 = v2 * (t23 + t1 + (t18 + t24)) + (coef[0] + v4 * t25);
-    const double t26 = v3 * p_v3;
-    const double t27 = 0.5 * (t22 - t26);
-    const double t28 = exp(t27);
-    const double t29 = t28 - 1.0;
-    const double t30 = coef[3] * v4;
-    const double t31 = t20 + (t30 + t24);
-    const double p_v4 = v3 * (t8 + t30 + (t11 + t4)) + (coef[0] + v5 * t31);
-    const double t32 = v4 * p_v4;
-    const double t33 = 0.5 * (t13 - t32);
-    const double t34 = exp(t33);
-    const double t35 = t34 - 1.0;
-    const double t36 = 0.5 * (t26 - t7);
-    const double t37 = exp(t36);
-    const double t38 = t37 - 1.0;
-    const double t39 = 0.5 * (t32 - t22);
-    const double t40 = exp(t39);
-    const double t41 = t40 - 1.0;
-    const double t42 = sinh(t14);
-    const double t43 = sinh(t27);
-    const double t44 = sinh(t33);
-    const double t45 = sinh(t36);
-    const double t46 = sinh(t39);
-    const double t47 = t4 + (t20 + t21);
-    const double t48 = v1 * (v5 * t15);
-    const double t49 = t18 + t19;
-    const double t50 = v1 * (v2 * t15);
-    const double t51 = t17 + t23;
-    const double t52 = t24 + (t11 + t12);
-    const double t53 = t6 + (t20 + t31);
-    const double t54 = t17 + t30;
-    const double t55 = t10 + t2;
-    const double t56 = v2 * (v1 * t28);
-    const double t57 = v2 * (v3 * t28);
-    const double t58 = t10 + t30;
-    const double t59 = t4 + (t5 + t25);
-    const double t60 = v3 * (v2 * t34);
-    const double t61 = v3 * (v4 * t34);
-    const double t62 = t23 + t2;
-    const double t63 = v4 * (v3 * t37);
-    const double t64 = v4 * (v5 * t37);
-    const double t65 = v5 * (v4 * t40);
-    const double t66 = v5 * (v1 * t40);
-    const double t67 = cosh(t14);
-    const double t68 = v1 * (v2 * t67);
-    const double t69 = v1 * (v5 * t67);
-    const double t70 = cosh(t27);
-    const double t71 = v2 * (v3 * t70);
-    const double t72 = v2 * (v1 * t70);
-    const double t73 = cosh(t33);
-    const double t74 = v3 * (v4 * t73);
-    const double t75 = v3 * (v2 * t73);
-    const double t76 = cosh(t36);
-    const double t77 = v4 * (v5 * t76);
-    const double t78 = v4 * (v3 * t76);
-    const double t79 = cosh(t39);
-    const double t80 = v5 * (v1 * t79);
-    const double t81 = v5 * (v4 * t79);
-    displacement[0] = v1 * t16;
-    displacement[1] = v2 * t29;
-    displacement[2] = v3 * t35;
-    displacement[3] = v4 * t38;
-    displacement[4] = v5 * t41;
-    increment[0] = (-2.0) * (v1 * t42);
-    increment[1] = (-2.0) * (v2 * t43);
-    increment[2] = (-2.0) * (v3 * t44);
-    increment[3] = (-2.0) * (v4 * t45);
-    increment[4] = (-2.0) * (v5 * t46);
-    jacobian[0] = 1.0 + (t16 + (0.5 * (t47 * t48) - 0.5 * (t49 * t50)));
-    jacobian[1] = 0.5 * (t24 * t48) - 0.5 * (t51 * t50) - 0.5 * (v1 * (p_v2 * t15));
-    jacobian[2] = 0.5 * (t1 * t48) - 0.5 * (t52 * t50);
-    jacobian[3] = 0.5 * (t53 * t48) - 0.5 * (t6 * t50);
-    jacobian[4] = 0.5 * (v1 * (p_v5 * t15)) + (0.5 * (t54 * t48) - 0.5 * (t24 * t50));
-    jacobian[5] = 0.5 * (v2 * (p_v1 * t28)) + (0.5 * (t55 * t56) - 0.5 * (t4 * t57));
-    jacobian[6] = 1.0 + (t29 + (0.5 * (t49 * t56) - 0.5 * (t52 * t57)));
-    jacobian[7] = 0.5 * (t4 * t56) - 0.5 * (t58 * t57) - 0.5 * (v2 * (p_v3 * t28));
-    jacobian[8] = 0.5 * (t8 * t56) - 0.5 * (t59 * t57);
-    jacobian[9] = 0.5 * (t47 * t56) - 0.5 * (t1 * t57);
-    jacobian[10] = 0.5 * (t49 * t60) - 0.5 * (t8 * t61);
-    jacobian[11] = 0.5 * (v3 * (p_v2 * t34)) + (0.5 * (t51 * t60) - 0.5 * (t6 * t61));
-    jacobian[12] = 1.0 + (t35 + (0.5 * (t52 * t60) - 0.5 * (t59 * t61)));
-    jacobian[13] = 0.5 * (t6 * t60) - 0.5 * (t62 * t61) - 0.5 * (v3 * (p_v4 * t34));
-    jacobian[14] = 0.5 * (t24 * t60) - 0.5 * (t53 * t61);
-    jacobian[15] = 0.5 * (t4 * t63) - 0.5 * (t47 * t64);
-    jacobian[16] = 0.5 * (t52 * t63) - 0.5 * (t24 * t64);
-    jacobian[17] = 0.5 * (v4 * (p_v3 * t37)) + (0.5 * (t58 * t63) - 0.5 * (t1 * t64));
-    jacobian[18] = 1.0 + (t38 + (0.5 * (t59 * t63) - 0.5 * (t53 * t64)));
-    jacobian[19] = 0.5 * (t1 * t63) - 0.5 * (t54 * t64) - 0.5 * (v4 * (p_v5 * t37));
-    jacobian[20] = 0.5 * (t8 * t65) - 0.5 * (t55 * t66) - 0.5 * (v5 * (p_v1 * t40));
-    jacobian[21] = 0.5 * (t6 * t65) - 0.5 * (t49 * t66);
-    jacobian[22] = 0.5 * (t59 * t65) - 0.5 * (t4 * t66);
-    jacobian[23] = 0.5 * (v5 * (p_v4 * t40)) + (0.5 * (t62 * t65) - 0.5 * (t8 * t66));
-    jacobian[24] = 1.0 + (t41 + (0.5 * (t53 * t65) - 0.5 * (t47 * t66)));
-    increment_jacobian[0] = t49 * t68 - t47 * t69 - 2.0 * t42;
-    increment_jacobian[1] = v1 * (p_v2 * t67) + (t51 * t68 - t24 * t69);
-    increment_jacobian[2] = t52 * t68 - t1 * t69;
-    increment_jacobian[3] = t6 * t68 - t53 * t69;
-    increment_jacobian[4] = t24 * t68 - t54 * t69 - v1 * (p_v5 * t67);
-    increment_jacobian[5] = t4 * t71 - t55 * t72 - v2 * (p_v1 * t70);
-    increment_jacobian[6] = t52 * t71 - t49 * t72 - 2.0 * t43;
-    increment_jacobian[7] = v2 * (p_v3 * t70) + (t58 * t71 - t4 * t72);
-    increment_jacobian[8] = t59 * t71 - t8 * t72;
-    increment_jacobian[9] = t1 * t71 - t47 * t72;
-    increment_jacobian[10] = t8 * t74 - t49 * t75;
-    increment_jacobian[11] = t6 * t74 - t51 * t75 - v3 * (p_v2 * t73);
-    increment_jacobian[12] = t59 * t74 - t52 * t75 - 2.0 * t44;
-    increment_jacobian[13] = v3 * (p_v4 * t73) + (t62 * t74 - t6 * t75);
-    increment_jacobian[14] = t53 * t74 - t24 * t75;
-    increment_jacobian[15] = t47 * t77 - t4 * t78;
-    increment_jacobian[16] = t24 * t77 - t52 * t78;
-    increment_jacobian[17] = t1 * t77 - t58 * t78 - v4 * (p_v3 * t76);
-    increment_jacobian[18] = t53 * t77 - t59 * t78 - 2.0 * t45;
-    increment_jacobian[19] = v4 * (p_v5 * t76) + (t54 * t77 - t1 * t78);
-    increment_jacobian[20] = v5 * (p_v1 * t79) + (t55 * t80 - t8 * t81);
-    increment_jacobian[21] = t49 * t80 - t6 * t81;
-    increment_jacobian[22] = t4 * t80 - t59 * t81;
-    increment_jacobian[23] = t8 * t80 - t62 * t81 - v5 * (p_v4 * t79);
-    increment_jacobian[24] = t47 * t80 - t53 * t81 - 2.0 * t46;
+    const double t14 = expm1(0.5 * (t7 - t13));
+    const double t15 = coef[3] * v1;
+    const double t16 = coef[1] * v2;
+    const double t17 = t9 + (t15 + t16);
+    const double t18 = coef[1] * v5;
+    const double t19 = t18 + (t15 + t1);
+    const double p_v1 = v2 * t17 + (coef[0] + v5 * t19);
+    const double t20 = v1 * p_v1;
+    const double t21 = coef[3] * v3;
+    const double t22 = coef[2] * v1;
+    const double t23 = t8 + (t5 + t21);
+    const double p_v3 = v2 * (t21 + t1 + (t16 + t22)) + (coef[0] + v4 * t23);
+    const double t24 = v3 * p_v3;
+    const double t25 = expm1(0.5 * (t20 - t24));
+    const double t26 = coef[3] * v4;
+    const double t27 = t18 + (t26 + t22);
+    const double p_v4 = v3 * (t8 + t26 + (t11 + t4)) + (coef[0] + v5 * t27);
+    const double t28 = v4 * p_v4;
+    const double t29 = expm1(0.5 * (t13 - t28));
+    const double t30 = expm1(0.5 * (t24 - t7));
+    const double t31 = expm1(0.5 * (t28 - t20));
+    const double t32 = 1.0 + t14;
+    const double t33 = 1.0 / t32;
+    const double t34 = 1.0 + t33;
+    const double t35 = t14 * t34;
+    const double t36 = 1.0 + t25;
+    const double t37 = 1.0 / t36;
+    const double t38 = 1.0 + t37;
+    const double t39 = t25 * t38;
+    const double t40 = 1.0 + t29;
+    const double t41 = 1.0 / t40;
+    const double t42 = 1.0 + t41;
+    const double t43 = t29 * t42;
+    const double t44 = 1.0 + t30;
+    const double t45 = 1.0 / t44;
+    const double t46 = 1.0 + t45;
+    const double t47 = t30 * t46;
+    const double t48 = 1.0 + t31;
+    const double t49 = 1.0 / t48;
+    const double t50 = 1.0 + t49;
+    const double t51 = t31 * t50;
+    const double t52 = t4 + (t18 + t19);
+    const double t53 = v5 * t32;
+    const double t54 = v1 * t53;
+    const double t55 = t16 + t17;
+    const double t56 = v2 * t32;
+    const double t57 = v1 * t56;
+    const double t58 = t15 + t21;
+    const double t59 = p_v2 * t32;
+    const double t60 = t22 + (t11 + t12);
+    const double t61 = t6 + (t18 + t27);
+    const double t62 = p_v5 * t32;
+    const double t63 = t15 + t26;
+    const double t64 = p_v1 * t36;
+    const double t65 = t10 + t2;
+    const double t66 = v1 * t36;
+    const double t67 = v2 * t66;
+    const double t68 = v3 * t36;
+    const double t69 = v2 * t68;
+    const double t70 = t10 + t26;
+    const double t71 = p_v3 * t36;
+    const double t72 = t4 + (t5 + t23);
+    const double t73 = v2 * t40;
+    const double t74 = v3 * t73;
+    const double t75 = v4 * t40;
+    const double t76 = v3 * t75;
+    const double t77 = p_v2 * t40;
+    const double t78 = t21 + t2;
+    const double t79 = p_v4 * t40;
+    const double t80 = v3 * t44;
+    const double t81 = v4 * t80;
+    const double t82 = v5 * t44;
+    const double t83 = v4 * t82;
+    const double t84 = p_v3 * t44;
+    const double t85 = p_v5 * t44;
+    const double t86 = v4 * t48;
+    const double t87 = v5 * t86;
+    const double t88 = v1 * t48;
+    const double t89 = v5 * t88;
+    const double t90 = p_v1 * t48;
+    const double t91 = p_v4 * t48;
+    const double t92 = t33 * t33;
+    const double t93 = v1 * (0.5 * (t53 * t34) - 0.5 * (t14 * (t92 * t53)));
+    const double t94 = v1 * (0.5 * (t14 * (t92 * t56)) - 0.5 * (t56 * t34));
+    const double t95 = t37 * t37;
+    const double t96 = v2 * (0.5 * (t66 * t38) - 0.5 * (t25 * (t95 * t66)));
+    const double t97 = v2 * (0.5 * (t25 * (t95 * t68)) - 0.5 * (t68 * t38));
+    const double t98 = t41 * t41;
+    const double t99 = v3 * (0.5 * (t73 * t42) - 0.5 * (t29 * (t98 * t73)));
+    const double t100 = v3 * (0.5 * (t29 * (t98 * t75)) - 0.5 * (t75 * t42));
+    const double t101 = t45 * t45;
+    const double t102 = v4 * (0.5 * (t30 * (t82 * t101)) - 0.5 * (t82 * t46));
+    const double t103 = v4 * (0.5 * (t80 * t46) - 0.5 * (t30 * (t80 * t101)));
+    const double t104 = t49 * t49;
+    const double t105 = v5 * (0.5 * (t31 * (t104 * t88)) - 0.5 * (t88 * t50));
+    const double t106 = v5 * (0.5 * (t86 * t50) - 0.5 * (t31 * (t104 * t86)));
+    displacement[0] = v1 * t14;
+    displacement[1] = v2 * t25;
+    displacement[2] = v3 * t29;
+    displacement[3] = v4 * t30;
+    displacement[4] = v5 * t31;
+    increment[0] = -(v1 * t35);
+    increment[1] = -(v2 * t39);
+    increment[2] = -(v3 * t43);
+    increment[3] = -(v4 * t47);
+    increment[4] = -(v5 * t51);
+    jacobian[0] = 1.0 + (t14 + (0.5 * (t52 * t54) - 0.5 * (t55 * t57)));
+    jacobian[1] = 0.5 * (t22 * t54) - 0.5 * (t58 * t57) - 0.5 * (v1 * t59);
+    jacobian[2] = 0.5 * (t1 * t54) - 0.5 * (t60 * t57);
+    jacobian[3] = 0.5 * (t61 * t54) - 0.5 * (t6 * t57);
+    jacobian[4] = 0.5 * (v1 * t62) + (0.5 * (t63 * t54) - 0.5 * (t22 * t57));
+    jacobian[5] = 0.5 * (v2 * t64) + (0.5 * (t65 * t67) - 0.5 * (t4 * t69));
+    jacobian[6] = 1.0 + (t25 + (0.5 * (t55 * t67) - 0.5 * (t60 * t69)));
+    jacobian[7] = 0.5 * (t4 * t67) - 0.5 * (t70 * t69) - 0.5 * (v2 * t71);
+    jacobian[8] = 0.5 * (t8 * t67) - 0.5 * (t72 * t69);
+    jacobian[9] = 0.5 * (t52 * t67) - 0.5 * (t1 * t69);
+    jacobian[10] = 0.5 * (t55 * t74) - 0.5 * (t8 * t76);
+    jacobian[11] = 0.5 * (v3 * t77) + (0.5 * (t58 * t74) - 0.5 * (t6 * t76));
+    jacobian[12] = 1.0 + (t29 + (0.5 * (t60 * t74) - 0.5 * (t72 * t76)));
+    jacobian[13] = 0.5 * (t6 * t74) - 0.5 * (t78 * t76) - 0.5 * (v3 * t79);
+    jacobian[14] = 0.5 * (t22 * t74) - 0.5 * (t61 * t76);
+    jacobian[15] = 0.5 * (t4 * t81) - 0.5 * (t52 * t83);
+    jacobian[16] = 0.5 * (t60 * t81) - 0.5 * (t22 * t83);
+    jacobian[17] = 0.5 * (v4 * t84) + (0.5 * (t70 * t81) - 0.5 * (t1 * t83));
+    jacobian[18] = 1.0 + (t30 + (0.5 * (t72 * t81) - 0.5 * (t61 * t83)));
+    jacobian[19] = 0.5 * (t1 * t81) - 0.5 * (t63 * t83) - 0.5 * (v4 * t85);
+    jacobian[20] = 0.5 * (t8 * t87) - 0.5 * (t65 * t89) - 0.5 * (v5 * t90);
+    jacobian[21] = 0.5 * (t6 * t87) - 0.5 * (t55 * t89);
+    jacobian[22] = 0.5 * (t72 * t87) - 0.5 * (t4 * t89);
+    jacobian[23] = 0.5 * (v5 * t91) + (0.5 * (t78 * t87) - 0.5 * (t8 * t89));
+    jacobian[24] = 1.0 + (t31 + (0.5 * (t61 * t87) - 0.5 * (t52 * t89)));
+    increment_jacobian[0] = -(t35 + (t52 * t93 + t55 * t94));
+    increment_jacobian[1] = -(v1 * (0.5 * (t14 * (t92 * t59)) - 0.5 * (t59 * t34)) + (t58 * t94 + t22 * t93));
+    increment_jacobian[2] = -(t1 * t93 + t60 * t94);
+    increment_jacobian[3] = -(t61 * t93 + t6 * t94);
+    increment_jacobian[4] = -(v1 * (0.5 * (t62 * t34) - 0.5 * (t14 * (t92 * t62))) + (t63 * t93 + t22 * t94));
+    increment_jacobian[5] = -(v2 * (0.5 * (t64 * t38) - 0.5 * (t25 * (t95 * t64))) + (t65 * t96 + t4 * t97));
+    increment_jacobian[6] = -(t39 + (t60 * t97 + t55 * t96));
+    increment_jacobian[7] = -(v2 * (0.5 * (t25 * (t95 * t71)) - 0.5 * (t71 * t38)) + (t4 * t96 + t70 * t97));
+    increment_jacobian[8] = -(t72 * t97 + t8 * t96);
+    increment_jacobian[9] = -(t52 * t96 + t1 * t97);
+    increment_jacobian[10] = -(t55 * t99 + t8 * t100);
+    increment_jacobian[11] = -(v3 * (0.5 * (t77 * t42) - 0.5 * (t29 * (t77 * t98))) + (t6 * t100 + t58 * t99));
+    increment_jacobian[12] = -(t43 + (t60 * t99 + t72 * t100));
+    increment_jacobian[13] = -(v3 * (0.5 * (t29 * (t98 * t79)) - 0.5 * (t79 * t42)) + (t78 * t100 + t6 * t99));
+    increment_jacobian[14] = -(t61 * t100 + t22 * t99);
+    increment_jacobian[15] = -(t52 * t102 + t4 * t103);
+    increment_jacobian[16] = -(t60 * t103 + t22 * t102);
+    increment_jacobian[17] = -(v4 * (0.5 * (t84 * t46) - 0.5 * (t30 * (t84 * t101))) + (t70 * t103 + t1 * t102));
+    increment_jacobian[18] = -(t47 + (t61 * t102 + t72 * t103));
+    increment_jacobian[19] = -(v4 * (0.5 * (t30 * (t85 * t101)) - 0.5 * (t85 * t46)) + (t1 * t103 + t63 * t102));
+    increment_jacobian[20] = -(v5 * (0.5 * (t31 * (t104 * t90)) - 0.5 * (t90 * t50)) + (t65 * t105 + t8 * t106));
+    increment_jacobian[21] = -(t55 * t105 + t6 * t106);
+    increment_jacobian[22] = -(t72 * t106 + t4 * t105);
+    increment_jacobian[23] = -(v5 * (0.5 * (t91 * t50) - 0.5 * (t31 * (t104 * t91))) + (t78 * t106 + t8 * t105));
+    increment_jacobian[24] = -(t51 + (t52 * t105 + t61 * t106));
 }
 
 /* Solve matrix * solution = side, both overwritten, by elimination with partial pivoting. 0 if singular. */
@@ -257,12 +282,12 @@ static void volterra5_predict(volterra5_memory *memory, double value[5])
     for (int k = 0; k < memory->guess; ++k)
         for (int i = 0; i < 5; ++i) guess[0][i] += memory->lag[k][i];
     if (memory->trained) {
+        const int last = memory->count - 1;
         double odd[5] = { 0.0 };
-        const double(*past)[5] = memory->past + memory->count - 16;
         for (int k = 0; k < 16; k += 2)
             for (int i = 0; i < 5; ++i) {
-                guess[1][i] += memory->weight[k][i] * past[16 - 1 - k][i];
-                odd[i] += memory->weight[k + 1][i] * past[16 - 2 - k][i];
+                guess[1][i] += memory->weight[k][i] * memory->past[last - k][i];
+                odd[i] += memory->weight[k + 1][i] * memory->past[last - 1 - k][i];
             }
         for (int i = 0; i < 5; ++i) guess[1][i] += odd[i];
     }
@@ -275,15 +300,15 @@ static void volterra5_train(volterra5_memory *memory, int component)
 {
     enum { ROWS = 80 - 16, ALL = 80 };
     double q[16][ALL], r[16][16], b[ALL] = { 0.0 }, largest = 0.0;
-    const double(*past)[5] = memory->past + memory->count - 80;
+    const int first = memory->count - 80;
     memset(q, 0, sizeof q);
     for (int i = 0; i < 80; ++i)
-        if (fabs(past[i][component]) > largest) largest = fabs(past[i][component]);
+        if (fabs(memory->past[first + i][component]) > largest) largest = fabs(memory->past[first + i][component]);
     for (int k = 0; k < 16; ++k) {
-        for (int i = 0; i < ROWS; ++i) q[k][i] = past[i + 16 - 1 - k][component];
+        for (int i = 0; i < ROWS; ++i) q[k][i] = memory->past[first + i + 16 - 1 - k][component];
         q[k][ROWS + k] = 1e-13 * largest;
     }
-    for (int i = 0; i < ROWS; ++i) b[i] = past[i + 16][component];
+    for (int i = 0; i < ROWS; ++i) b[i] = memory->past[first + i + 16][component];
     for (int k = 0; k < 16; ++k) {
         double norm = 0.0, along = 0.0;
         for (int i = 0; i < ALL; ++i) norm += q[k][i] * q[k][i];
@@ -361,7 +386,7 @@ static double volterra5_size(const double y[5], const double delta[5])
 
 /* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the extrapolated guess, and advance. The
    increment is corrected to first order by the last Newton correction, so that correction costs no evaluation:
-   a correction is accepted when the error that remains after it, quadratic in it, is below 1e-17. */
+   a correction is accepted when the error that remains after it, quadratic in it, is below 1e-18. */
 static volterra5_status volterra5_attempt(volterra5_solver *s, int stage)
 {
     const double *coef = s->coef[stage];
@@ -383,7 +408,7 @@ static volterra5_status volterra5_attempt(volterra5_solver *s, int stage)
         const double growth = size / (previous * previous);
         const double remaining = size * size * (growth > 1.0 ? growth : 1.0);
         /* The second test: corrections no longer shrink, the solve has reached the level of rounding. */
-        if (remaining <= 1e-17 || (previous < 1e-8 && size > 0.25 * previous)) {
+        if (remaining <= 1e-18 || (previous < 1e-8 && size > 0.25 * previous)) {
             double offset[5];
             for (int i = 0; i < 5; ++i) {
                 offset[i] = y[i] - s->x[i];

@@ -5,7 +5,7 @@
  *   bi-realisation: log-canonical, symmetric
  *   generating function: S_1 ... S_3 (collected polynomial, 20 terms)
  *   step: implicit, Newton iteration with the analytic matrix
- *   one Newton iteration: 143 additions, 295 multiplications, 15 functions
+ *   one Newton iteration: 168 additions, 375 multiplications, 5 divisions, 5 functions
  *
  * spec: volterra5, sha256 cfd60e7b7b6deffb6e5297d17c105b63a43ab52b9aeaa9bde72b05fd871e6d03
  * to regenerate: phigen build volterra5.yaml

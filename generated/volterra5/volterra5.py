@@ -4,7 +4,7 @@
 #   bi-realisation: log-canonical, symmetric
 #   generating function: S_1 ... S_3 (collected polynomial, 20 terms)
 #   step: implicit, Newton iteration with the analytic matrix
-#   one Newton iteration: 143 additions, 295 multiplications, 15 functions
+#   one Newton iteration: 168 additions, 375 multiplications, 5 divisions, 5 functions
 #
 # spec: volterra5, sha256 cfd60e7b7b6deffb6e5297d17c105b63a43ab52b9aeaa9bde72b05fd871e6d03
 # to regenerate: phigen build volterra5.yaml
@@ -12,7 +12,7 @@
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: bd1f56d765705e630906e4a8ddb13ec3205f6526f32f214da4116657af223ecf
+# body-sha256: 7f2d384a3e7fda303028d1fc3ff2b6a551db56a2b4dd090edc04d5b7615ecf77
 import numpy as np
 
 VERSION = "0.1.0"
@@ -78,8 +78,8 @@ def _prepare(parameters, h):
 
 
 def _linearise(coef, y):
-    """At the point y: displacement alpha - y, increment beta - alpha, the jacobian of alpha and that of
-    the increment, all with the momenta p = grad s_h(y)."""
+    """At the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of
+    the increment, all with the momenta p = grad S_h(y)."""
     v1 = y[..., 0]
     v2 = y[..., 1]
     v3 = y[..., 2]
@@ -100,139 +100,158 @@ def _linearise(coef, y):
     t12 = t1 + (t10 + t11)
     p_v2 = v1 * (t9 + (t10 + t3)) + (coef[0] + v3 * t12)
     t13 = v2 * p_v2
-    t14 = 0.5 * (t7 - t13)
-    t15 = np.exp(t14)
-    t16 = t15 - 1.0
-    t17 = coef[3] * v1
-    t18 = coef[1] * v2
-    t19 = t9 + (t17 + t18)
-    t20 = coef[1] * v5
-    t21 = t20 + (t17 + t1)
-    p_v1 = v2 * t19 + (coef[0] + v5 * t21)
-    t22 = v1 * p_v1
-    t23 = coef[3] * v3
-    t24 = coef[2] * v1
-    t25 = t8 + (t5 + t23)
-    p_v3 = v2 * (t23 + t1 + (t18 + t24)) + (coef[0] + v4 * t25)
-    t26 = v3 * p_v3
-    t27 = 0.5 * (t22 - t26)
-    t28 = np.exp(t27)
-    t29 = t28 - 1.0
-    t30 = coef[3] * v4
-    t31 = t20 + (t30 + t24)
-    p_v4 = v3 * (t8 + t30 + (t11 + t4)) + (coef[0] + v5 * t31)
-    t32 = v4 * p_v4
-    t33 = 0.5 * (t13 - t32)
-    t34 = np.exp(t33)
-    t35 = t34 - 1.0
-    t36 = 0.5 * (t26 - t7)
-    t37 = np.exp(t36)
-    t38 = t37 - 1.0
-    t39 = 0.5 * (t32 - t22)
-    t40 = np.exp(t39)
-    t41 = t40 - 1.0
-    t42 = np.sinh(t14)
-    t43 = np.sinh(t27)
-    t44 = np.sinh(t33)
-    t45 = np.sinh(t36)
-    t46 = np.sinh(t39)
-    t47 = t4 + (t20 + t21)
-    t48 = v1 * (v5 * t15)
-    t49 = t18 + t19
-    t50 = v1 * (v2 * t15)
-    t51 = t17 + t23
-    t52 = t24 + (t11 + t12)
-    t53 = t6 + (t20 + t31)
-    t54 = t17 + t30
-    t55 = t10 + t2
-    t56 = v2 * (v1 * t28)
-    t57 = v2 * (v3 * t28)
-    t58 = t10 + t30
-    t59 = t4 + (t5 + t25)
-    t60 = v3 * (v2 * t34)
-    t61 = v3 * (v4 * t34)
-    t62 = t23 + t2
-    t63 = v4 * (v3 * t37)
-    t64 = v4 * (v5 * t37)
-    t65 = v5 * (v4 * t40)
-    t66 = v5 * (v1 * t40)
-    t67 = np.cosh(t14)
-    t68 = v1 * (v2 * t67)
-    t69 = v1 * (v5 * t67)
-    t70 = np.cosh(t27)
-    t71 = v2 * (v3 * t70)
-    t72 = v2 * (v1 * t70)
-    t73 = np.cosh(t33)
-    t74 = v3 * (v4 * t73)
-    t75 = v3 * (v2 * t73)
-    t76 = np.cosh(t36)
-    t77 = v4 * (v5 * t76)
-    t78 = v4 * (v3 * t76)
-    t79 = np.cosh(t39)
-    t80 = v5 * (v1 * t79)
-    t81 = v5 * (v4 * t79)
+    t14 = np.expm1(0.5 * (t7 - t13))
+    t15 = coef[3] * v1
+    t16 = coef[1] * v2
+    t17 = t9 + (t15 + t16)
+    t18 = coef[1] * v5
+    t19 = t18 + (t15 + t1)
+    p_v1 = v2 * t17 + (coef[0] + v5 * t19)
+    t20 = v1 * p_v1
+    t21 = coef[3] * v3
+    t22 = coef[2] * v1
+    t23 = t8 + (t5 + t21)
+    p_v3 = v2 * (t21 + t1 + (t16 + t22)) + (coef[0] + v4 * t23)
+    t24 = v3 * p_v3
+    t25 = np.expm1(0.5 * (t20 - t24))
+    t26 = coef[3] * v4
+    t27 = t18 + (t26 + t22)
+    p_v4 = v3 * (t8 + t26 + (t11 + t4)) + (coef[0] + v5 * t27)
+    t28 = v4 * p_v4
+    t29 = np.expm1(0.5 * (t13 - t28))
+    t30 = np.expm1(0.5 * (t24 - t7))
+    t31 = np.expm1(0.5 * (t28 - t20))
+    t32 = 1.0 + t14
+    t33 = 1.0 / t32
+    t34 = 1.0 + t33
+    t35 = t14 * t34
+    t36 = 1.0 + t25
+    t37 = 1.0 / t36
+    t38 = 1.0 + t37
+    t39 = t25 * t38
+    t40 = 1.0 + t29
+    t41 = 1.0 / t40
+    t42 = 1.0 + t41
+    t43 = t29 * t42
+    t44 = 1.0 + t30
+    t45 = 1.0 / t44
+    t46 = 1.0 + t45
+    t47 = t30 * t46
+    t48 = 1.0 + t31
+    t49 = 1.0 / t48
+    t50 = 1.0 + t49
+    t51 = t31 * t50
+    t52 = t4 + (t18 + t19)
+    t53 = v5 * t32
+    t54 = v1 * t53
+    t55 = t16 + t17
+    t56 = v2 * t32
+    t57 = v1 * t56
+    t58 = t15 + t21
+    t59 = p_v2 * t32
+    t60 = t22 + (t11 + t12)
+    t61 = t6 + (t18 + t27)
+    t62 = p_v5 * t32
+    t63 = t15 + t26
+    t64 = p_v1 * t36
+    t65 = t10 + t2
+    t66 = v1 * t36
+    t67 = v2 * t66
+    t68 = v3 * t36
+    t69 = v2 * t68
+    t70 = t10 + t26
+    t71 = p_v3 * t36
+    t72 = t4 + (t5 + t23)
+    t73 = v2 * t40
+    t74 = v3 * t73
+    t75 = v4 * t40
+    t76 = v3 * t75
+    t77 = p_v2 * t40
+    t78 = t21 + t2
+    t79 = p_v4 * t40
+    t80 = v3 * t44
+    t81 = v4 * t80
+    t82 = v5 * t44
+    t83 = v4 * t82
+    t84 = p_v3 * t44
+    t85 = p_v5 * t44
+    t86 = v4 * t48
+    t87 = v5 * t86
+    t88 = v1 * t48
+    t89 = v5 * t88
+    t90 = p_v1 * t48
+    t91 = p_v4 * t48
+    t92 = t33 * t33
+    t93 = v1 * (0.5 * (t53 * t34) - 0.5 * (t14 * (t92 * t53)))
+    t94 = v1 * (0.5 * (t14 * (t92 * t56)) - 0.5 * (t56 * t34))
+    t95 = t37 * t37
+    t96 = v2 * (0.5 * (t66 * t38) - 0.5 * (t25 * (t95 * t66)))
+    t97 = v2 * (0.5 * (t25 * (t95 * t68)) - 0.5 * (t68 * t38))
+    t98 = t41 * t41
+    t99 = v3 * (0.5 * (t73 * t42) - 0.5 * (t29 * (t98 * t73)))
+    t100 = v3 * (0.5 * (t29 * (t98 * t75)) - 0.5 * (t75 * t42))
+    t101 = t45 * t45
+    t102 = v4 * (0.5 * (t30 * (t82 * t101)) - 0.5 * (t82 * t46))
+    t103 = v4 * (0.5 * (t80 * t46) - 0.5 * (t30 * (t80 * t101)))
+    t104 = t49 * t49
+    t105 = v5 * (0.5 * (t31 * (t104 * t88)) - 0.5 * (t88 * t50))
+    t106 = v5 * (0.5 * (t86 * t50) - 0.5 * (t31 * (t104 * t86)))
     return (
-        _filled(y, [v1 * t16, v2 * t29, v3 * t35, v4 * t38, v5 * t41]),
+        _filled(y, [v1 * t14, v2 * t25, v3 * t29, v4 * t30, v5 * t31]),
+        _filled(y, [-(v1 * t35), -(v2 * t39), -(v3 * t43), -(v4 * t47), -(v5 * t51)]),
         _filled(y, [
-            (-2.0) * (v1 * t42),
-            (-2.0) * (v2 * t43),
-            (-2.0) * (v3 * t44),
-            (-2.0) * (v4 * t45),
-            (-2.0) * (v5 * t46),
-        ]),
-        _filled(y, [
-            1.0 + (t16 + (0.5 * (t47 * t48) - 0.5 * (t49 * t50))),
-            0.5 * (t24 * t48) - 0.5 * (t51 * t50) - 0.5 * (v1 * (p_v2 * t15)),
-            0.5 * (t1 * t48) - 0.5 * (t52 * t50),
-            0.5 * (t53 * t48) - 0.5 * (t6 * t50),
-            0.5 * (v1 * (p_v5 * t15)) + (0.5 * (t54 * t48) - 0.5 * (t24 * t50)),
-            0.5 * (v2 * (p_v1 * t28)) + (0.5 * (t55 * t56) - 0.5 * (t4 * t57)),
-            1.0 + (t29 + (0.5 * (t49 * t56) - 0.5 * (t52 * t57))),
-            0.5 * (t4 * t56) - 0.5 * (t58 * t57) - 0.5 * (v2 * (p_v3 * t28)),
-            0.5 * (t8 * t56) - 0.5 * (t59 * t57),
-            0.5 * (t47 * t56) - 0.5 * (t1 * t57),
-            0.5 * (t49 * t60) - 0.5 * (t8 * t61),
-            0.5 * (v3 * (p_v2 * t34)) + (0.5 * (t51 * t60) - 0.5 * (t6 * t61)),
-            1.0 + (t35 + (0.5 * (t52 * t60) - 0.5 * (t59 * t61))),
-            0.5 * (t6 * t60) - 0.5 * (t62 * t61) - 0.5 * (v3 * (p_v4 * t34)),
-            0.5 * (t24 * t60) - 0.5 * (t53 * t61),
-            0.5 * (t4 * t63) - 0.5 * (t47 * t64),
-            0.5 * (t52 * t63) - 0.5 * (t24 * t64),
-            0.5 * (v4 * (p_v3 * t37)) + (0.5 * (t58 * t63) - 0.5 * (t1 * t64)),
-            1.0 + (t38 + (0.5 * (t59 * t63) - 0.5 * (t53 * t64))),
-            0.5 * (t1 * t63) - 0.5 * (t54 * t64) - 0.5 * (v4 * (p_v5 * t37)),
-            0.5 * (t8 * t65) - 0.5 * (t55 * t66) - 0.5 * (v5 * (p_v1 * t40)),
-            0.5 * (t6 * t65) - 0.5 * (t49 * t66),
-            0.5 * (t59 * t65) - 0.5 * (t4 * t66),
-            0.5 * (v5 * (p_v4 * t40)) + (0.5 * (t62 * t65) - 0.5 * (t8 * t66)),
-            1.0 + (t41 + (0.5 * (t53 * t65) - 0.5 * (t47 * t66))),
+            1.0 + (t14 + (0.5 * (t52 * t54) - 0.5 * (t55 * t57))),
+            0.5 * (t22 * t54) - 0.5 * (t58 * t57) - 0.5 * (v1 * t59),
+            0.5 * (t1 * t54) - 0.5 * (t60 * t57),
+            0.5 * (t61 * t54) - 0.5 * (t6 * t57),
+            0.5 * (v1 * t62) + (0.5 * (t63 * t54) - 0.5 * (t22 * t57)),
+            0.5 * (v2 * t64) + (0.5 * (t65 * t67) - 0.5 * (t4 * t69)),
+            1.0 + (t25 + (0.5 * (t55 * t67) - 0.5 * (t60 * t69))),
+            0.5 * (t4 * t67) - 0.5 * (t70 * t69) - 0.5 * (v2 * t71),
+            0.5 * (t8 * t67) - 0.5 * (t72 * t69),
+            0.5 * (t52 * t67) - 0.5 * (t1 * t69),
+            0.5 * (t55 * t74) - 0.5 * (t8 * t76),
+            0.5 * (v3 * t77) + (0.5 * (t58 * t74) - 0.5 * (t6 * t76)),
+            1.0 + (t29 + (0.5 * (t60 * t74) - 0.5 * (t72 * t76))),
+            0.5 * (t6 * t74) - 0.5 * (t78 * t76) - 0.5 * (v3 * t79),
+            0.5 * (t22 * t74) - 0.5 * (t61 * t76),
+            0.5 * (t4 * t81) - 0.5 * (t52 * t83),
+            0.5 * (t60 * t81) - 0.5 * (t22 * t83),
+            0.5 * (v4 * t84) + (0.5 * (t70 * t81) - 0.5 * (t1 * t83)),
+            1.0 + (t30 + (0.5 * (t72 * t81) - 0.5 * (t61 * t83))),
+            0.5 * (t1 * t81) - 0.5 * (t63 * t83) - 0.5 * (v4 * t85),
+            0.5 * (t8 * t87) - 0.5 * (t65 * t89) - 0.5 * (v5 * t90),
+            0.5 * (t6 * t87) - 0.5 * (t55 * t89),
+            0.5 * (t72 * t87) - 0.5 * (t4 * t89),
+            0.5 * (v5 * t91) + (0.5 * (t78 * t87) - 0.5 * (t8 * t89)),
+            1.0 + (t31 + (0.5 * (t61 * t87) - 0.5 * (t52 * t89))),
         ]).reshape(y.shape + (5,)),
         _filled(y, [
-            t49 * t68 - t47 * t69 - 2.0 * t42,
-            v1 * (p_v2 * t67) + (t51 * t68 - t24 * t69),
-            t52 * t68 - t1 * t69,
-            t6 * t68 - t53 * t69,
-            t24 * t68 - t54 * t69 - v1 * (p_v5 * t67),
-            t4 * t71 - t55 * t72 - v2 * (p_v1 * t70),
-            t52 * t71 - t49 * t72 - 2.0 * t43,
-            v2 * (p_v3 * t70) + (t58 * t71 - t4 * t72),
-            t59 * t71 - t8 * t72,
-            t1 * t71 - t47 * t72,
-            t8 * t74 - t49 * t75,
-            t6 * t74 - t51 * t75 - v3 * (p_v2 * t73),
-            t59 * t74 - t52 * t75 - 2.0 * t44,
-            v3 * (p_v4 * t73) + (t62 * t74 - t6 * t75),
-            t53 * t74 - t24 * t75,
-            t47 * t77 - t4 * t78,
-            t24 * t77 - t52 * t78,
-            t1 * t77 - t58 * t78 - v4 * (p_v3 * t76),
-            t53 * t77 - t59 * t78 - 2.0 * t45,
-            v4 * (p_v5 * t76) + (t54 * t77 - t1 * t78),
-            v5 * (p_v1 * t79) + (t55 * t80 - t8 * t81),
-            t49 * t80 - t6 * t81,
-            t4 * t80 - t59 * t81,
-            t8 * t80 - t62 * t81 - v5 * (p_v4 * t79),
-            t47 * t80 - t53 * t81 - 2.0 * t46,
+            -(t35 + (t52 * t93 + t55 * t94)),
+            -(v1 * (0.5 * (t14 * (t92 * t59)) - 0.5 * (t59 * t34)) + (t58 * t94 + t22 * t93)),
+            -(t1 * t93 + t60 * t94),
+            -(t61 * t93 + t6 * t94),
+            -(v1 * (0.5 * (t62 * t34) - 0.5 * (t14 * (t92 * t62))) + (t63 * t93 + t22 * t94)),
+            -(v2 * (0.5 * (t64 * t38) - 0.5 * (t25 * (t95 * t64))) + (t65 * t96 + t4 * t97)),
+            -(t39 + (t60 * t97 + t55 * t96)),
+            -(v2 * (0.5 * (t25 * (t95 * t71)) - 0.5 * (t71 * t38)) + (t4 * t96 + t70 * t97)),
+            -(t72 * t97 + t8 * t96),
+            -(t52 * t96 + t1 * t97),
+            -(t55 * t99 + t8 * t100),
+            -(v3 * (0.5 * (t77 * t42) - 0.5 * (t29 * (t77 * t98))) + (t6 * t100 + t58 * t99)),
+            -(t43 + (t60 * t99 + t72 * t100)),
+            -(v3 * (0.5 * (t29 * (t98 * t79)) - 0.5 * (t79 * t42)) + (t78 * t100 + t6 * t99)),
+            -(t61 * t100 + t22 * t99),
+            -(t52 * t102 + t4 * t103),
+            -(t60 * t103 + t22 * t102),
+            -(v4 * (0.5 * (t84 * t46) - 0.5 * (t30 * (t84 * t101))) + (t70 * t103 + t1 * t102)),
+            -(t47 + (t61 * t102 + t72 * t103)),
+            -(v4 * (0.5 * (t30 * (t85 * t101)) - 0.5 * (t85 * t46)) + (t1 * t103 + t63 * t102)),
+            -(v5 * (0.5 * (t31 * (t104 * t90)) - 0.5 * (t90 * t50)) + (t65 * t105 + t8 * t106)),
+            -(t55 * t105 + t6 * t106),
+            -(t72 * t106 + t4 * t105),
+            -(v5 * (0.5 * (t91 * t50) - 0.5 * (t31 * (t104 * t91))) + (t78 * t106 + t8 * t105)),
+            -(t51 + (t52 * t105 + t61 * t106)),
         ]).reshape(y.shape + (5,)),
     )
 
@@ -257,7 +276,7 @@ def _attempt(coef, x, carry, y):
     """Solve (y - x) + displacement(y) = 0 for y by Newton's method, and advance; arrays (members, DIM).
 
     The increment is corrected to first order by the last Newton correction, which is accepted when the error that
-    remains, quadratic in it, is below 1e-17. Returns new x, carry, y, and a status for each member,
+    remains, quadratic in it, is below 1e-18. Returns new x, carry, y, and a status for each member,
     "" if good.
     """
     x, carry, y = x.copy(), carry.copy(), y.copy()
@@ -274,7 +293,7 @@ def _attempt(coef, x, carry, y):
         y[open_] -= delta
         remaining = size**2 * np.maximum(1.0, size / previous[open_] ** 2)
         # The second test: corrections no longer shrink, the solve has reached the level of rounding.
-        done = (remaining <= 1e-17) | ((previous[open_] < 1e-8) & (size > 0.25 * previous[open_]))
+        done = (remaining <= 1e-18) | ((previous[open_] < 1e-8) & (size > 0.25 * previous[open_]))
         change = increment - (increment_jacobian @ delta[..., np.newaxis])[..., 0]
         total, rest = _sum(x[open_], carry[open_], change)
         good = done & np.isfinite(total).all(axis=-1)
@@ -368,7 +387,7 @@ def integrate(x0, h, steps, stride=1, gauge=None, **parameters):
 
 
 def _energy(parameters, x):
-    """The hamiltonian."""
+    """The Hamiltonian."""
     v1 = x[..., 0]
     v2 = x[..., 1]
     v3 = x[..., 2]
@@ -378,7 +397,7 @@ def _energy(parameters, x):
 
 
 def _casimirs(parameters, x):
-    """The casimirs."""
+    """The Casimirs."""
     v1 = x[..., 0]
     v2 = x[..., 1]
     v3 = x[..., 2]
@@ -388,7 +407,7 @@ def _casimirs(parameters, x):
 
 
 def _vector_field(parameters, x):
-    """Pi(x) grad h(x)."""
+    """Pi(x) grad H(x)."""
     v1 = x[..., 0]
     v2 = x[..., 1]
     v3 = x[..., 2]

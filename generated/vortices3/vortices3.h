@@ -5,7 +5,7 @@
  *   bi-realisation: constant, symmetric
  *   generating function: S_1 ... S_3 (shared graph)
  *   step: implicit, Newton iteration with the analytic matrix
- *   one Newton iteration: 701 additions, 1358 multiplications, 9 divisions
+ *   one Newton iteration: 701 additions, 1358 multiplications, 3 divisions
  *
  * spec: vortices3, sha256 9f4ece29d2cb2bfd4d374437bcb1bba6d3a05731db8beb500f407873d6a3394c
  * to regenerate: phigen build vortices3.yaml
