@@ -1,0 +1,175 @@
+"""What cannot be done is reported, and what was there before stands; members and copies are independent."""
+
+import ctypes
+
+import mpmath
+import numpy as np
+import pytest
+from support import NAMES, SPECIES, TARGETS, PreciseStep, RawC, compile_text, compiled, setting, solver
+
+from phigen.errors import StepError
+
+STATUSES = {"OK": 0, "NO_CONVERGENCE": 1, "SINGULAR": 2, "NOT_FINITE": 3, "BAD_ARGUMENT": 4}
+PAIR = "coordinates: [q, p]\npoisson: {canonical: {q: [q], p: [p]}}\norder: 2\n"
+
+#: Hamiltonian, state and step size of a step that fails, and how.
+FAILURES = {
+    # The Newton matrix is diag(1 − h/2, 1 + h/2).
+    "SINGULAR": ("p*q", [1.0, 1.0], 2.0),
+    # q = y − h/2 (y² + 1) has no real solution y.
+    "NO_CONVERGENCE": ("p*q**2 + p", [3.0, 1.0], 1.0),
+    "NOT_FINITE": ("p**2/2 + sqrt(q)", [-1.0, 0.0], 0.1),
+}
+
+
+def bits(x):
+    """The bytes of an array: −0 is not 0, NaN is NaN."""
+    return np.ascontiguousarray(x).tobytes()
+
+
+@pytest.mark.parametrize("status", FAILURES)
+@pytest.mark.parametrize("target", TARGETS)
+def test_a_step_that_cannot_be_made_says_why(status, target):
+    hamiltonian, x0, h = FAILURES[status]
+    solve = solver(compile_text(f"{PAIR}hamiltonian: {hamiltonian}\n"), target)
+    with pytest.raises(StepError) as caught:
+        solve.step(x0, h)
+    assert caught.value.status == status
+
+
+@pytest.mark.parametrize("status", FAILURES)
+def test_a_failed_step_leaves_the_state(status):
+    hamiltonian, x0, h = FAILURES[status]
+    raw = RawC(compile_text(f"{PAIR}hamiltonian: {hamiltonian}\n"))
+    raw.init(x0)
+    before = raw.x.copy(), raw.carry.copy()
+    assert raw.step(h) == STATUSES[status]
+    assert bits(raw.x) == bits(before[0])
+    assert bits(raw.carry) == bits(before[1])
+    assert raw.counters[0] == 0
+
+
+@pytest.mark.parametrize("factor", [10.0, 1e3, 1e8, -1e5, 1e200])
+@pytest.mark.parametrize("name", NAMES)
+def test_after_a_step_that_was_too_large_the_run_goes_on(name, factor):
+    """As if nothing had happened: the next steps are those that would have been, to round-off."""
+    compilation = compiled(name)
+    at, raw, other = setting(compilation), RawC(compilation), RawC(compilation)
+    for solve in (raw, other):
+        solve.init(at.x, at.parameters)
+        assert solve.integrate(at.h, 10) == 0
+    before, steps = raw.x.copy(), int(raw.counters[0])
+    status = raw.step(factor * at.h)
+    assert status in (0, 1, 2, 3)
+    assert np.isfinite(raw.x).all()
+    if status:
+        assert bits(raw.x) == bits(before)
+        assert raw.counters[0] == steps
+        assert raw.integrate(at.h, 10) == other.integrate(at.h, 10) == 0
+        np.testing.assert_allclose(raw.x, other.x, rtol=0, atol=1e-13 * np.max(np.abs(before)))
+
+
+# -- changing the step size, copying the solver
+
+
+@pytest.mark.parametrize("name", ["rigid_body", "lotka_volterra", "kepler", "pendulum_euler"])
+def test_the_step_size_may_change_at_every_step(name):
+    compilation = compiled(name)
+    at, raw = setting(compilation), RawC(compilation)
+    raw.init(at.x, at.parameters)
+    for factor in (1.0, 1.0, 0.5, -0.25, 1.0, 2.0):
+        h, before = factor * at.h, raw.exact_state()
+        assert raw.step(h) == 0
+        exact = PreciseStep(compilation, at.parameters, h)(before)
+        with mpmath.workdps(40):
+            error = max(abs(u - v) for u, v in zip(raw.exact_state(), exact, strict=True))
+        assert error <= 1e-16 * np.max(np.abs(raw.x))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_copy_of_the_solver_is_a_branch(name):
+    compilation = compiled(name)
+    at, raw = setting(compilation), RawC(compilation)
+    raw.init(at.x, at.parameters)
+    assert raw.integrate(at.h, 7) == 0
+    kept = raw.memory.copy()
+    assert raw.integrate(at.h, 5) == 0
+    end = bits(raw.x)
+    raw.memory[:] = kept
+    assert raw.integrate(at.h, 5) == 0
+    assert bits(raw.x) == end
+    raw.memory[:] = kept
+    assert raw.integrate(-at.h, 5) == 0
+    assert bits(raw.x) != end
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_missing_parameters_are_the_defaults(name):
+    compilation = compiled(name)
+    at, defaults = setting(compilation), {p.name: float(p.value) for p in compilation.spec.parameters}
+    ends = []
+    for parameters in (None, defaults):
+        raw = RawC(compilation)
+        assert raw.init(at.x, parameters) == 0
+        assert raw.integrate(at.h, 3) == 0
+        ends.append(bits(raw.x))
+    assert ends[0] == ends[1]
+
+
+# -- ensembles
+
+
+def members_of(name, count):
+    """States near that of the first run."""
+    at = setting(compiled(name))
+    return np.array([[v * (1 + 0.003 * k) + 0.001 * k for v in at.x] for k in range(count)]), at
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_members_of_an_ensemble_are_trajectories(name):
+    """In C to the last bit, in NumPy to round-off."""
+    start, at = members_of(name, 5)
+    compilation, steps = compiled(name), 5 if compiled(name).program.driver == "path" else 20
+    for target in TARGETS:
+        solve = solver(compilation, target)
+        together = solve.ensemble(start, at.h, steps, parameters=at.parameters)
+        for x0, end in zip(start, together, strict=True):
+            alone = solve.integrate(x0, at.h, steps, stride=steps, parameters=at.parameters).x[-1]
+            if target == "c":
+                assert bits(alone) == bits(end)
+            else:
+                np.testing.assert_allclose(end, alone, rtol=0, atol=2e-15 * np.max(np.abs(alone)))
+
+
+def test_failing_members_keep_their_last_good_state():
+    """One species system runs into its singularity, the others go on."""
+    compilation = compile_text(SPECIES + "order: 2\n")
+    start = np.array([[0.3, 0.9, 0.6], [-3.0, 5.0, 0.001], [0.5, 0.2, 0.1]])
+    with pytest.raises(StepError) as single:
+        solver(compilation, "c").integrate(start[1], 1e-3, 400)
+    assert single.value.status in ("NO_CONVERGENCE", "SINGULAR", "NOT_FINITE")
+    last = single.value.trajectory.x[-1]
+    assert 100 < single.value.step < 260
+    with pytest.raises(StepError) as many:
+        solver(compilation, "c").ensemble(start, 1e-3, 400)
+    assert many.value.members == (1,)
+    assert many.value.status == single.value.status
+    states = many.value.trajectory
+    assert bits(states[1]) == bits(last)
+    for k in (0, 2):
+        assert bits(states[k]) == bits(solver(compilation, "c").integrate(start[k], 1e-3, 400).x[-1])
+
+
+def test_status_of_each_member_is_reported():
+    compilation = compile_text(SPECIES + "order: 2\n")
+    raw, members = RawC(compilation), 4
+    x = np.array([[0.3, -3.0, 0.5, np.nan], [0.9, 5.0, 0.2, 1.0], [0.6, 0.001, 0.1, 1.0]])
+    status = np.full(members, 99, dtype=np.uint8)
+    pointers = [ctypes.c_void_p(a.ctypes.data) for a in (x, status)]
+    numbers = ctypes.c_size_t(members), ctypes.c_double(1e-3), ctypes.c_size_t(400)
+    overall = raw.call("ensemble", ctypes.c_int, None, pointers[0], *numbers, pointers[1])
+    assert status[0] == status[2] == STATUSES["OK"]
+    assert status[1] in (1, 2, 3)
+    assert status[3] == STATUSES["BAD_ARGUMENT"]
+    assert overall == status[1]
+    assert np.isfinite(x[:, :3]).all()
