@@ -34,8 +34,7 @@ def _scipy(problem: Problem) -> Method:
     f = sympy.lambdify(problem.symbols, problem.field, "math")
     rhs: Field = lambda t, x: f(*x)  # noqa: E731
 
-    def run(start: Sequence[float], tolerance: float, chunk: int, chunks: int, limit: float) -> Run:
-        # Only the span that the limit allows, measured on a hundredth of it; the caller sees what was done.
+    def run(start: Sequence[float], tolerance: float, chunk: float, chunks: int, limit: float) -> Run:
         began = time.thread_time()
         span = float(chunk)  # for adaptive methods a chunk is a time
         states, x, evaluations, status = np.full((chunks, len(start)), np.nan), np.array(start), 0, "ok"
@@ -108,7 +107,7 @@ def _heyoka(problem: Problem) -> Method:
     system = [(v, heyoka.from_sympy(sympy.N(e, 17), table)) for v, e in zip(variables, problem.field, strict=True)]
     solvers: dict[float, Any] = {}
 
-    def run(start: Sequence[float], tolerance: float, chunk: int, chunks: int, limit: float) -> Run:
+    def run(start: Sequence[float], tolerance: float, chunk: float, chunks: int, limit: float) -> Run:
         if tolerance not in solvers:
             accurate = tolerance < 1e-15
             solvers[tolerance] = heyoka.taylor_adaptive(system, list(start), tol=tolerance, high_accuracy=accurate)

@@ -43,8 +43,8 @@ class Run:
     status: str
 
 
-#: start, step, steps of a chunk, chunks, seconds after which to give up
-Runner = Callable[[Sequence[float], float, int, int, float], Run]
+#: start, step, steps of a chunk (for adaptive methods: tolerance, time of a chunk), chunks, seconds to give up after
+Runner = Callable[[Sequence[float], float, Any, int, float], Run]
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,143 @@
+"""Measurements as Markdown. Times are shown beside ratios within the same run, never alone."""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+from benchmarks.measure import Cell, Study, Target, ratios
+from phigen.runtime import toolchain
+
+
+def machine() -> str:
+    """The processor, the compiler and its flags."""
+    model = platform.processor() or platform.machine()
+    info = Path("/proc/cpuinfo")
+    if info.exists():
+        names = [line.partition(":")[2].strip() for line in info.read_text().splitlines() if "model name" in line]
+        model = f"{names[0]}, {len(names)} cores" if names else model
+    compiler = toolchain.find()
+    return f"{model}; {compiler.version}; `{' '.join(toolchain.flags(compiler))}`; Python {platform.python_version()}"
+
+
+def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    lines = ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
+    return "\n".join([*lines, *("| " + " | ".join(row) + " |" for row in rows)])
+
+
+def work_precision(study: Study) -> str:
+    """One row for each method: time over the time of the best phigen solver, by target."""
+    targets = list(dict.fromkeys(c.target for c in study.cells))
+    best = {t: _best(study.cells, t, "phigen") for t in targets}
+    rows = []
+    for label in dict.fromkeys(c.method for c in study.cells):
+        row = [label]
+        found = {c.target: c for c in study.cells if c.method == label}
+        row += [_entry(found.get(t), best[t]) for t in targets]
+        results = [c.result for c in found.values() if c.result]
+        sharp = min(results, key=lambda r: r.energy, default=None)
+        row += [f"{sharp.casimir:.0e}", sharp.drift_class] if sharp else ["", ""]
+        rows.append(row)
+    rows.append(["**phigen's best, ms**", *(f"{1e3 * median(b.times):.3g}" if b else "–" for b in best.values()), "", ""])
+    rows.append(["**best peer / phigen**", *(_speed_up(study, t, best[t]) for t in targets), "", ""])
+    head = ["", *(f"{'energy' if t[0] == 'energy' else 'orbit'} {t[1]:.0e}" for t in targets), "Casimir", "drift"]
+    failures = _failures(study)
+    text = f"### {study.title}, T = {study.horizon:g}\n\n{table(head, rows)}\n"
+    return text + "".join(f"\n- {note}" for note in [*study.notes, *failures]) + "\n"
+
+
+def _entry(cell: Cell | None, best: Cell | None) -> str:
+    if cell is None or cell.result is None or not cell.times:
+        return "not reached"
+    name = f"h={cell.result.setting:.3g}" if cell.result.steps and cell.result.order else f"{cell.result.setting:.0e}"
+    if cell.family == "phigen":
+        name = f"k={cell.result.order}, {name}"
+    if best is None:
+        return f"{1e3 * median(cell.times):.3g} ms ({name})"
+    if cell is best:
+        return f"**1** ({name})"
+    middle, least, most = ratios(cell.times, best.times)
+    return f"{middle:.2f} [{least:.2f}–{most:.2f}] ({name})"
+
+
+def _speed_up(study: Study, target: Target, best: Cell | None) -> str:
+    peer = _best(study.cells, target, "peer")
+    if best is None or peer is None:
+        return "phigen alone" if best else "peers alone" if peer else "–"
+    middle, least, most = ratios(peer.times, best.times)
+    return f"**{middle:.2f}** [{least:.2f}–{most:.2f}] {peer.method}"
+
+
+def _best(cells: Sequence[Cell], target: Target, family: str) -> Cell | None:
+    able = [c for c in cells if c.target == target and c.family == family and c.times]
+    return min(able, key=lambda c: median(c.times), default=None)
+
+
+def _failures(study: Study) -> list[str]:
+    """Runs that did not end well, method by method: they count nowhere, but they are told."""
+    failed: dict[tuple[str, str], list[float]] = {}
+    for r in study.scans:
+        if r.status not in ("ok", "too slow"):
+            failed.setdefault((r.method, r.status), []).append(r.setting)
+    return [f"{m}: {status} at {', '.join(f'{h:.3g}' for h in hs)}" for (m, status), hs in failed.items()]
+
+
+def speed_ups(studies: Sequence[Study]) -> str:
+    """The summary: best peer over phigen, for all problems and horizons."""
+    targets = list(dict.fromkeys(c.target for s in studies for c in s.cells))
+    rows = []
+    for s in studies:
+        entries = [_speed_up(s, t, _best(s.cells, t, "phigen")) for t in targets]
+        rows.append([f"{s.title}, T = {s.horizon:g}", *entries])
+    return table(["best peer / phigen", *(f"{t[0]} {t[1]:.0e}" for t in targets)], rows) + "\n"
+
+
+def cost_of_steps(rows: Sequence[dict[str, Any]]) -> str:
+    text = [
+        [
+            r["problem"], r["method"], f"{r['h']:g}", f"{r['ns']:.0f}",
+            f"{r['over_rk4']:.2f} [{r['least']:.2f}–{r['most']:.2f}]",
+            f"{r['evaluations']:.2f}" if r["evaluations"] else "", r["status"],
+        ]
+        for r in rows
+    ]  # fmt: skip
+    return table(["", "method", "h", "ns per step", "over RK4 in C", "evaluations per step", "status"], text) + "\n"
+
+
+def ensembles(rows: Sequence[dict[str, Any]]) -> str:
+    base = min((median(r["times"]) for r in rows if r["method"].startswith("RK4")), default=1.0)
+    text = [
+        [
+            r["method"], f"{r['h']:.3g}", f"{median(r['times']):.1f}", f"{median(r['times']) / base:.2f}",
+            f"{r['energy']:.0e}", f"{r['casimir']:.0e}", "ok" if not r["status"] else f"status {r['status']}",
+        ]
+        for r in sorted(rows, key=lambda r: -r["energy"])
+    ]  # fmt: skip
+    head = ["", "h or tolerance", "ns per unit time and member", "over the coarsest RK4", "energy", "Casimir", "status"]
+    return table(head, text) + "\n"
+
+
+def growth(rows: Sequence[dict[str, Any]]) -> str:
+    text = []
+    for r in rows:
+        if "generating" in r:
+            text.append([str(r["n"]), r["method"], "", f"{r['generating']:.2f} s, compiler {r['compiling']:.2f} s", ""])
+        elif r["status"] != "ok":
+            text.append([str(r["n"]), r["method"], "", "", r["status"]])
+        else:
+            over = f"{r['over_rk4']:.2f} [{r['least']:.2f}–{r['most']:.2f}]"
+            text.append([str(r["n"]), r["method"], f"{r['ns_per_coordinate']:.1f}", over, "ok"])
+    return table(["n", "method", "ns per step and coordinate", "over RK4 in C", "status"], text) + "\n"
+
+
+def build_times(rows: Sequence[dict[str, Any]]) -> str:
+    text = [
+        [r["spec"], f"{r['phigen']:.2f}", f"{r['compiler']:.2f}", str(r["lines"])]
+        if r["status"] == "ok"
+        else [r["spec"], r["status"], "", ""]
+        for r in rows
+    ]
+    return table(["spec", "phigen, s", "C compiler, s", "lines of C"], text) + "\n"
