@@ -100,6 +100,13 @@ def _with_gradient(quantity: Expression, coordinates: Sequence[str], values: Map
     return evaluate([quantity, *gradient(quantity, coordinates)], values)
 
 
+def size_of(quantity: Expression, coordinates: Sequence[str], values: Mapping[str, Any]) -> float:
+    """The largest size of a quantity along a trajectory, as `Drift` counts it."""
+    value, *slopes = _with_gradient(quantity, coordinates, values)
+    parts = sum(np.abs(values[c] * g) for c, g in zip(coordinates, slopes, strict=True))
+    return float(np.max(np.maximum(np.abs(value), parts))) or 1.0
+
+
 def poisson_matrix(system: System, parameters: Mapping[str, float], x: Floats) -> Floats:
     """π(x), (DIM, DIM)."""
     at = {**parameters, **dict(zip(system.coordinates, x, strict=True))}
