@@ -215,7 +215,7 @@ def test_runge_kutta_fails_every_check(name):
     at, solve = setting(compilation), solver(compilation, "c")
     rates = Rates(compilation, at.parameters)
     speed = np.max(np.abs(solve.vector_field(at.x, parameters=at.parameters)))
-    h = 0.3 * float(np.max(np.abs(at.x)) / speed)
+    h = 0.1 * float(np.max(np.abs(at.x)) / speed)
     with mpmath.workdps(50):
         assert defect_of_map(rk4(rates.field, mpmath.mpf(h)), rates.poisson, at.x) > 1e-9
     step = rk4(lambda x: solve.vector_field(x, parameters=at.parameters), h)
