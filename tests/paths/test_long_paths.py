@@ -100,6 +100,18 @@ def test_path_out_of_the_domain_is_reported(target):
     assert caught.value.trajectory.x[-1] == pytest.approx([0.5, 0.1])
 
 
+def test_mean_out_of_the_domain_of_the_hamiltonian_is_reported_and_the_state_kept():
+    text = "coordinates: [x, y]\npoisson: {brackets: {x: {y: 1}}}\nhamiltonian: sqrt(x) + 3*y\n"
+    compilation = compile_paths(text, 2)
+    raw = RawC(compilation)
+    raw.init((0.5, 0.25))
+    assert raw.step(-1.0) != 0
+    assert list(raw.x) == [0.5, 0.25]
+    assert raw.step(1.0) == 0
+    with pytest.raises(StepError):
+        solver(compilation, "numpy").step((0.5, 0.25), h=-1.0)
+
+
 @pytest.mark.parametrize("target", TARGETS)
 def test_one_member_that_fails_does_not_fail_the_others(target):
     solve = solver(compile_paths(POLE, 2), target)

@@ -6,6 +6,8 @@ import pytest
 from precise_path import PATH_DIGITS, PrecisePathStep, PreciseSystem, by_paths, compile_paths, numbers, state_of
 from support import TARGETS, RawC, casimir_scales, relative_defect, solver, values
 
+from phigen.scheme.composition import COMPOSITIONS
+
 #: Systems of the corpus without a closed form, and some that have one.
 NAMES = (
     "ablowitz_ladik3",
@@ -142,6 +144,16 @@ def test_observed_order_is_the_stated_one(name, order):
     rates = np.log2(errors[:-1] / errors[1:])
     assert abs(rates[-1] - order) < 0.15
     assert errors[-1] > 100 * EPS
+
+
+@pytest.mark.parametrize("composition", COMPOSITIONS, ids=lambda c: f"{c.name}-{c.order}")
+def test_fractions_of_a_composition_satisfy_the_order_conditions_to_roundoff(composition):
+    # Of all conditions those on power sums: Σγ = 1, Σγ³ = 0, Σγ⁵ = 0, …; the fractions are read the same backwards.
+    fractions = composition.fractions
+    assert fractions == fractions[::-1]
+    assert abs(sum(fractions) - 1) < 4 * EPS
+    for power in range(3, composition.order, 2):
+        assert abs(sum(f**power for f in fractions)) < 1e-14
 
 
 COMPOSED = [("suzuki", 4), ("triple-jump", 4), ("kahan-li", 6), ("yoshida", 6), ("kahan-li", 8), ("yoshida", 8)]
