@@ -158,7 +158,9 @@ def _peer_source(problem: Problem, names: Sequence[str]) -> str:
     if problem.splitting:
         parts += [f"#define {name} ({value!r})" for name, value in problem.constants.items()]
         parts.append(f'#include "elementary.h"\n#include "splitting_{problem.splitting}.h"')
-        parts.append("COMPOSE(splitting, splitting_step, whole_step)\nCOMPOSE(splitting_kl8, splitting_step, kahan_li8)")
+        parts.append(
+            "COMPOSE(splitting, splitting_step, whole_step)\nCOMPOSE(splitting_kl8, splitting_step, kahan_li8)"
+        )
     parts.append(f"static void (*const methods[])(real *, double, long) = {{ {', '.join(names)} }};")
     return "\n".join([*parts, '#include "run_peers.h"\n'])
 

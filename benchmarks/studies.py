@@ -29,8 +29,8 @@ class Effort:
     """How much is run: rounds of timing, seconds that one run may take over the two horizons (0: not run)."""
 
     rounds: int = 5
-    limit: float = 0.25
-    long_limit: float = 4.0
+    limit: float = 0.12
+    long_limit: float = 1.5
     quick: bool = False
 
 
@@ -76,20 +76,22 @@ def work_precision(problem: Problem, effort: Effort, say: Callable[[str], None])
     return studies
 
 
-def _long(
-    problem: Problem, methods: list[Method], scans: dict[str, Any], short: list[Cell], effort: Effort
-) -> Study:
+def _long(problem: Problem, methods: list[Method], scans: dict[str, Any], short: list[Cell], effort: Effort) -> Study:
     """Those that were best over the short horizon, and the classics, over the long one (energy only)."""
     judge, cells, everything = Judge(problem), [], []
     for target in ENERGY:
         chosen = {c.result.method for c in short if c.target == target and c.family == "phigen" and c.result}
         # A target of the short horizon that needs order k may need a neighbour of it here.
         ours = [m for m in methods if m.family == "phigen" and m.name in chosen]
-        peers = [m for m in methods if m.family != "phigen" and not m.name.startswith(("scipy", "RK4", "Kahan in"))]
+        peers = [
+            m
+            for m in methods
+            if m.family != "phigen" and not m.name.startswith(("scipy", "RK4", "Kahan in", "Poisson"))
+        ]
         results = {m.name: reach(m, problem, judge, scans[m.name], target, effort.long_limit) for m in [*ours, *peers]}
         everything += [r for rs in results.values() for r in rs]
         cells += _cells([*ours, *peers], results, target)
-    rounds = max(2, effort.rounds - 2)
+    rounds = max(2, effort.rounds - 3)
     time_cells(cells, {m.name: m for m in methods}, problem.long, SAMPLES["long"], judge, rounds)
     return Study(problem.name, problem.title, problem.long, everything, cells, [])
 

@@ -41,7 +41,9 @@ def work_precision(study: Study) -> str:
         sharp = min(results, key=lambda r: r.energy, default=None)
         row += [f"{sharp.casimir:.0e}", sharp.drift_class] if sharp else ["", ""]
         rows.append(row)
-    rows.append(["**phigen's best, ms**", *(f"{1e3 * median(b.times):.3g}" if b else "–" for b in best.values()), "", ""])
+    rows.append(
+        ["**phigen's best, ms**", *(f"{1e3 * median(b.times):.3g}" if b else "–" for b in best.values()), "", ""]
+    )
     rows.append(["**best peer / phigen**", *(_speed_up(study, t, best[t]) for t in targets), "", ""])
     head = ["", *(f"{'energy' if t[0] == 'energy' else 'orbit'} {t[1]:.0e}" for t in targets), "Casimir", "drift"]
     failures = _failures(study)
@@ -54,7 +56,7 @@ def _entry(cell: Cell | None, best: Cell | None) -> str:
         return "not reached"
     name = f"h={cell.result.setting:.3g}" if cell.result.steps and cell.result.order else f"{cell.result.setting:.0e}"
     if cell.family == "phigen":
-        name = f"k={cell.result.order}, {name}"
+        name = f"order {cell.result.order}, {name}"
     if best is None:
         return f"{1e3 * median(cell.times):.3g} ms ({name})"
     if cell is best:
