@@ -68,9 +68,12 @@ def brackets(system: System, realisation: BiRealisation, degree: int) -> Iterato
     def label(i: int, j: int, m: int) -> str:
         return f"({system.coordinates[i]}, {system.coordinates[j]}) in degree {m}"
 
+    # A path is followed itself, and is a bi-realisation by Karasev's theorem; a truncation is cut off.
+    beyond = "followed as a path, exact by Karasev's theorem" if realisation.path else "approximate beyond"
+
     def decided(name: str, residuals: Iterator[tuple[str, Poly]]) -> Statement:
-        return decide_elements(f"bi-realisation: {name}, up to degree {degree - 1} in p", parts.tower, residuals,
-                               system.positive, "degree by degree; approximate beyond")  # fmt: skip
+        title = f"bi-realisation: {name}, up to degree {degree - 1} in p"
+        return decide_elements(title, parts.tower, residuals, system.positive, f"degree by degree; {beyond}")
 
     def own(first: int, sign: int) -> Iterator[tuple[str, Poly]]:
         for m in range(degree):

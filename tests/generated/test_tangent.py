@@ -9,7 +9,7 @@ import mpmath
 import numpy as np
 import pytest
 from precise_path import PrecisePathStep
-from support import BODY, NAMES, TARGETS, PreciseStep, RawC, compile_text, compiled, files, setting, solver
+from support import BODY, NAMES, TARGETS, PreciseStep, RawC, compile_text, compiled, files, plain, setting, solver
 
 from phigen import StepError, compile, resources, spec
 from phigen.analysis.arrays import evaluate
@@ -19,12 +19,12 @@ from phigen.spec.model import Extras
 TANGENT = Extras(tangent=True)
 #: Each driver, with one stage and with several, small systems first.
 KINDS = ("pendulum_euler", "rigid_body", "volterra5", "kowalevski_top", "nambu_pendulum", "sir_epidemic")
-COMPOSED = f"{BODY}order: 6\ncomposition: kahan-li\n"
+COMPOSED = f"{BODY}order: 6\ncomposition: kahan-li\ngauge: none\n"
 
 
 @cache
 def with_tangent(name):
-    return compile_spec(spec.load(resources.bundled_specs() / f"{name}.yaml"), extras=TANGENT)
+    return compile_spec(plain(spec.load(resources.bundled_specs() / f"{name}.yaml")), extras=TANGENT)
 
 
 def text_with_tangent(text):
