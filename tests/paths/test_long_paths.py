@@ -42,7 +42,7 @@ def test_long_path_is_followed_in_pieces(coordinates, form, hamiltonian, start, 
 @pytest.mark.parametrize("target", TARGETS)
 def test_mean_of_a_path_in_pieces_enters_the_equation(target):
     text = LONG_TEXT.format(hamiltonian="3*x - y + 2*z + (x**2 + y*z)/40")
-    compilation, start, h = compile_paths(text, 2), (0.3, -0.8, 0.5), 3.0
+    compilation, start, h = compile_paths(text, 2), (0.3, -0.8, 0.5), 1.0
     image = [float(v) for v in PrecisePathStep(compilation, {}, h)(start)]
     assert np.max(np.abs(solver(compilation, target).step(start, h=h) - image)) < 100 * EPS
     plain = compile_paths(LONG_TEXT.format(hamiltonian="3*x - y + 2*z"), 2)

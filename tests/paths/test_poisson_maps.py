@@ -130,7 +130,6 @@ ORDERS = [
     ("maxwell_bloch", 6),
     ("sir_epidemic", 4),
     ("guiding_centre", 4),
-    ("ablowitz_ladik3", 4),
 ]
 
 
