@@ -7,7 +7,7 @@ import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache as cached
 from pathlib import Path
 from typing import Any
 
@@ -19,9 +19,14 @@ from benchmarks.problems import Problem
 from phigen import spec as specs
 from phigen.analysis.proof import compile_proved
 from phigen.compiler import emit
+from phigen.errors import Diagnostic, LimitError
 from phigen.runtime import cache
 
 C_FILES = Path(__file__).parent / "c"
+
+#: Solvers with more lines of C are not compiled: it would take minutes.
+LINES = 12_000
+
 STATUSES = {0: "ok", 1: "no convergence", 2: "singular", 3: "not finite", 4: "bad argument", 100: "too slow"}
 
 _HALF = (
@@ -72,12 +77,14 @@ class Built:
     summary: str
 
 
-@lru_cache(maxsize=None)
+@cached
 def build_phigen(text: str) -> Built:
     """Raises `PhigenError`s: what phigen refuses is reported, not hidden."""
     start = time.perf_counter()
     source = emit(compile_proved(specs.loads(text, "bench.yaml")).program, "c", "", single_file=True)["bench.c"]
     middle = time.perf_counter()
+    if (lines := source.count("\n")) > LINES:
+        raise LimitError([Diagnostic(f"{lines:,} lines of C are too many to compile here")])
     main = (
         "#define _POSIX_C_SOURCE 199309L\n"
         '#include "common.h"\n#pragma GCC visibility push(hidden)\n#include "bench.h"\n#pragma GCC visibility pop\n'

@@ -46,7 +46,8 @@ def methods_of(problem: Problem, effort: Effort) -> tuple[list[Method], list[str
             try:
                 ours.append(phigen_method(problem, order, gauge))
             except PhigenError as error:
-                notes.append(f"phigen {order}, gauge {gauge}: {str(error).splitlines()[0]}")
+                notes.append(f"phigen {order} and above, gauge {gauge}: {str(error).splitlines()[0]}")
+                break
     peers = c_peers(problem)
     if not effort.quick:
         more, missing = python_peers.available(problem)
