@@ -79,6 +79,7 @@ class Tower:
         self.context = fmpq_mpoly_ctx.get([f"v{i}" for i in range(len(self.names))] or ["v0"], Ordering.degrevlex)
         self.gens = self.context.gens()
         self._index = {n: i for i, n in enumerate(self.names)}
+        self._pairs: list[tuple[int, int]] | None = None
 
     def constant(self, value: int | Fraction) -> Poly:
         """The rational number as an element."""
@@ -178,6 +179,7 @@ class Tower:
         """A function of elements, where the tower has it (used for constant terms of series)."""
         if name.startswith("constant:"):
             return self._generator(name, [])
+        args = [self.cancelled(a) for a in args]
         if name == "abs":
             return self.function("sign", args) * args[0]
         if name == "expm1":
@@ -217,7 +219,7 @@ class Tower:
 
     def power(self, base: Poly, exponent: Fraction | int) -> Poly:
         """base ** exponent for a rational exponent."""
-        exponent = Fraction(exponent)
+        base, exponent = self.cancelled(base), Fraction(exponent)
         if exponent.denominator == 1:
             n = int(exponent)
             return base**n if n >= 0 else self._reciprocal(base) ** (-n)
@@ -280,7 +282,7 @@ class Tower:
                 partial = element.derivative(self._index[g.name])
                 if partial != 0:
                     result += partial * chain
-        return result
+        return self.cancelled(result)
 
     def depends_on(self, element: Poly, names: Iterable[str]) -> bool:
         """Whether some of the symbols occur, directly or inside a generator."""
@@ -354,11 +356,44 @@ class Tower:
         return {e: self.context.from_dict(d) for e, d in groups.items()}
 
     def combine(self, terms: Iterable[Poly]) -> Poly:
-        """The sum of the terms."""
+        """The sum of the terms, v · (1/v) cancelled."""
         result = self.zero
         for t in terms:
             result += t
-        return result
+        return self.cancelled(result)
+
+    def cancelled(self, element: Poly) -> Poly:
+        """The element with products of a variable and its reciprocal, or of w and 1/w for a root, cancelled."""
+        degrees = element.degrees()
+        pairs = [(i, j) for i, j in self._inverse_pairs() if degrees[i] and degrees[j]]
+        if not pairs:
+            return element
+        terms: dict[tuple[int, ...], Any] = {}
+        for m, c in element.to_dict().items():
+            exponents = [int(e) for e in m]
+            for i, j in pairs:
+                common = min(exponents[i], exponents[j])
+                exponents[i] -= common
+                exponents[j] -= common
+            key = tuple(exponents)
+            terms[key] = terms[key] + c if key in terms else c
+        return self.context.from_dict({m: c for m, c in terms.items() if c != 0})
+
+    def _inverse_pairs(self) -> list[tuple[int, int]]:
+        """Indices of ring variables whose product is 1."""
+        if self._pairs is None:
+            self._pairs = []
+            for g in self.generators:
+                own = self._index[g.name]
+                if g.kind == "reciprocal":
+                    self._pairs += [(i, own) for i, v in enumerate(self.gens) if v == g.arguments[0]]
+                if g.kind == "root" and g.inverse:
+                    self._pairs += [
+                        (self._index[o.name], own)
+                        for o in self.generators
+                        if o.kind == "root" and not o.inverse and (o.degree, o.arguments) == (g.degree, g.arguments)
+                    ]
+        return self._pairs
 
     def vanishes(self, element: Poly) -> bool:
         """Whether the element is 0 as a polynomial (no relations used)."""
