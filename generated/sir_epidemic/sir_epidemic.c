@@ -5,7 +5,7 @@
  *   bi-realisation: karasev, symmetric
  *   generating function: S_1 ... S_3 (collected polynomial, 4 terms)
  *   step: implicit in p, each path followed by its Taylor series to round-off
- *   one evaluation of the equation for p: 2 additions, 14 multiplications, 1 divisions
+ *   one evaluation of the equation for p: 2 additions, 11 multiplications, 1 divisions
  *
  * spec: sir_epidemic, sha256 115b753136b45d645443f1dd70079639f2bd0e5420635c11a5444e91e153af93
  * to regenerate: phigen build sir_epidemic.yaml
@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: ef32827612813c4d592c282d358b604e94c7fbf08dfa2e2a2d3833736d7a3421
+ * body-sha256: 389af3446e0932545e779def00a1d3ce4dfc217b5355fe2721ac8741ff38230f
  */
 #include "sir_epidemic.h"
 
@@ -29,11 +29,11 @@ static const double sir_epidemic_fractions[1] = { 1.0 };
 /* everything that depends on parameters and step size only */
 static void sir_epidemic_prepare(const sir_epidemic_params *params, double h, double coef[restrict 4])
 {
-    const double t1 = h * (h * h) * (params->gamma_ * (params->beta * params->beta));
-    coef[0] = params->gamma_ * h;
+    const double t1 = params->gamma_ * h;
+    coef[0] = t1;
     coef[1] = -(params->beta * h);
-    coef[2] = (-1.0 / 12.0) * t1;
-    coef[3] = 1.0 / 12.0 * t1;
+    coef[2] = (-1.0 / 12.0) * (h * (h * h) * (params->gamma_ * (params->beta * params->beta)));
+    coef[3] = -t1;
 }
 
 /* p = grad S_h(y), and the Jacobian 1 - Hess S_h(y) pi(y) / 2 of the equation for p, up to O(h^2) */
@@ -43,19 +43,18 @@ static void sir_epidemic_generate(const double coef[4], const double y[3], doubl
     const double S = y[0];
     const double I_ = y[1];
     const double t1 = 1.0 / S;
-    const double t2 = t1 * t1;
-    const double t3 = I_ * S;
-    const double t4 = t3 * (coef[0] * t2);
-    const double t5 = coef[2] * t3;
+    const double t2 = I_ * S;
+    const double t3 = t2 * (coef[3] * (t1 * t1));
+    const double t4 = coef[2] * t2;
     slope[0] = coef[1] + coef[0] * t1;
-    slope[1] = coef[1] + coef[2] * (t2 * (I_ * (S * S)));
+    slope[1] = coef[1] + I_ * coef[2];
     slope[2] = 0.0;
     jacobian[0] = 1.0;
-    jacobian[1] = 0.5 * t4;
-    jacobian[2] = (-0.5) * t4;
-    jacobian[3] = 0.5 * t5;
+    jacobian[1] = (-0.5) * t3;
+    jacobian[2] = 0.5 * t3;
+    jacobian[3] = 0.5 * t4;
     jacobian[4] = 1.0;
-    jacobian[5] = (-0.5) * t5;
+    jacobian[5] = (-0.5) * t4;
     jacobian[6] = 0.0;
     jacobian[7] = 0.0;
     jacobian[8] = 1.0;

@@ -5,7 +5,7 @@
  *   bi-realisation: karasev, symmetric
  *   generating function: S_1 ... S_3 (collected polynomial, 4 terms)
  *   step: implicit in p, each path followed by its Taylor series to round-off
- *   one evaluation of the equation for p: 2 additions, 14 multiplications, 1 divisions
+ *   one evaluation of the equation for p: 2 additions, 11 multiplications, 1 divisions
  *
  * spec: sir_epidemic, sha256 115b753136b45d645443f1dd70079639f2bd0e5420635c11a5444e91e153af93
  * to regenerate: phigen build sir_epidemic.yaml

@@ -4,7 +4,7 @@
 #   bi-realisation: karasev, symmetric
 #   generating function: S_1 ... S_3 (collected polynomial, 4 terms)
 #   step: implicit in p, each path followed by its Taylor series to round-off
-#   one evaluation of the equation for p: 2 additions, 14 multiplications, 1 divisions
+#   one evaluation of the equation for p: 2 additions, 11 multiplications, 1 divisions
 #
 # spec: sir_epidemic, sha256 115b753136b45d645443f1dd70079639f2bd0e5420635c11a5444e91e153af93
 # to regenerate: phigen build sir_epidemic.yaml
@@ -12,7 +12,7 @@
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: bc553926978dbd76f32a774f8b7193b29d4e990cd7ab2756cc9ee394a79215e5
+# body-sha256: db20396fc63b828ba8c63265ba66a7520324ae138632c4b6c19ab3a77d95f32d
 import numpy as np
 
 VERSION = "0.1.0"
@@ -77,8 +77,8 @@ def _prepare(parameters, h):
     """Everything that depends on parameters and step size only."""
     beta = parameters["beta"]
     gamma = parameters["gamma"]
-    t1 = h * (h * h) * (gamma * (beta * beta))
-    return [gamma * h, -(beta * h), (-1.0 / 12.0) * t1, 1.0 / 12.0 * t1]
+    t1 = gamma * h
+    return [t1, -(beta * h), (-1.0 / 12.0) * (h * (h * h) * (gamma * (beta * beta))), -t1]
 
 
 def _generate(coef, y):
@@ -87,13 +87,12 @@ def _generate(coef, y):
     S = y[..., 0]
     I = y[..., 1]
     t1 = 1.0 / S
-    t2 = t1 * t1
-    t3 = I * S
-    t4 = t3 * (coef[0] * t2)
-    t5 = coef[2] * t3
+    t2 = I * S
+    t3 = t2 * (coef[3] * (t1 * t1))
+    t4 = coef[2] * t2
     return (
-        _filled(y, [coef[1] + coef[0] * t1, coef[1] + coef[2] * (t2 * (I * (S * S))), 0.0]),
-        _filled(y, [1.0, 0.5 * t4, (-0.5) * t4, 0.5 * t5, 1.0, (-0.5) * t5, 0.0, 0.0, 1.0]).reshape(y.shape + (3,)),
+        _filled(y, [coef[1] + coef[0] * t1, coef[1] + I * coef[2], 0.0]),
+        _filled(y, [1.0, (-0.5) * t3, 0.5 * t3, 0.5 * t4, 1.0, (-0.5) * t4, 0.0, 0.0, 1.0]).reshape(y.shape + (3,)),
     )
 
 
