@@ -49,6 +49,31 @@ def test_a_failed_step_leaves_the_state(status):
     assert raw.counters[0] == 0
 
 
+def test_a_sum_that_overflows_leaves_the_state():
+    """The position could move, the momentum cannot: neither does."""
+    text = PAIR.replace("order: 2", "order: 1") + "birealisation: canonical-euler\nhamiltonian: p**2/2 + exp(q)\n"
+    compilation = compile_text(text)
+    assert compilation.program.driver == "explicit"
+    for start in ([800.0, 1.0], [1e308, 1e308]):
+        raw = RawC(compilation)
+        raw.init(start)
+        assert raw.step(0.5) == STATUSES["NOT_FINITE"]
+        assert raw.x.tolist() == start
+        assert raw.carry.tolist() == [0.0, 0.0]
+
+
+@pytest.mark.parametrize("factor", [0.3, 0.7, 1.7])
+@pytest.mark.parametrize("name", [n for n in NAMES if compiled(n).program.driver == "newton"])
+def test_no_step_of_a_long_run_stalls(name, factor):
+    """Coordinates pass through zero, where rounding is large relative to them; the solve must end all the same."""
+    compilation = compiled(name)
+    run = list(compilation.spec.runs)[-1]
+    at, raw = setting(compilation, run), RawC(compilation)
+    raw.init(at.x, at.parameters)
+    steps = {"lotka_volterra": 10_000, "spin_chain5": 5_000}.get(name, 20_000)
+    assert raw.integrate(factor * at.h, steps) == 0
+
+
 @pytest.mark.parametrize("factor", [10.0, 1e3, 1e8, -1e5, 1e200])
 @pytest.mark.parametrize("name", NAMES)
 def test_after_a_step_that_was_too_large_the_run_goes_on(name, factor):

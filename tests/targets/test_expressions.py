@@ -70,22 +70,46 @@ def cases():
         yield f"({value})/z", binary("mul", number(value), power(z, -1))
         yield f"z/({value})", binary("mul", z, raw("pow", (number(value),), Fraction(-1)))
     yield from {"pi": PI, "E": EULER, "pi*x": PI * x, "E**y": call("power", EULER, y), "1": ONE}.items()
-    inner = {op: binary(op, x, y) for op in ("add", "sub", "mul")}
-    inner |= {"quotient": binary("mul", x, power(y, -1)), "reverse": binary("mul", power(y, -1), x)}
-    inner |= {"neg": -x, "square": x**2, "reciprocal": 1 / x, "third": number(Fraction(1, 3))}
-    for outer in ("add", "sub", "mul"):
-        for name, e in inner.items():
-            yield f"({name}) {outer} z", binary(outer, e, z)
-            yield f"z {outer} ({name})", binary(outer, z, e)
-            yield f"({name}) {outer} ({name})", binary(outer, e, binary("add", e, z))
-    for name, e in inner.items():
-        yield f"neg {name}", raw("neg", (e,))
-        yield f"neg neg {name}", raw("neg", (raw("neg", (e,)),))
-        yield f"1/({name})", raw("pow", (e,), Fraction(-1))
-        yield f"z/({name})", binary("mul", z, raw("pow", (e,), Fraction(-1)))
-        yield f"1/({name})/({name})", binary("mul", raw("pow", (e,), Fraction(-1)), raw("pow", (e,), Fraction(-1)))
-        yield f"({name})**2*z", binary("mul", raw("pow", (e,), Fraction(2)), z)
-        yield f"z/({name})**2", binary("mul", z, raw("pow", (raw("pow", (e,), Fraction(2)),), Fraction(-1)))
+    yield from nested()
+
+
+def nested():
+    """Every operator as the operand of every other, from a fresh constant each: what is shared becomes a temporary."""
+    constants = (number(1 + Fraction(k, 1024)) for k in range(1000))
+
+    def made(form):
+        c = next(constants)
+        match form:
+            case "add" | "sub" | "mul":
+                return binary(form, x, c)
+            case "quotient":
+                return binary("mul", binary("add", x, c), power(y, -1))
+            case "reverse":
+                return binary("mul", power(y, -1), binary("add", x, c))
+            case "neg":
+                return raw("neg", (binary("mul", x, c),))
+            case "reciprocal":
+                return raw("pow", (binary("add", x, c),), Fraction(-1))
+            case "square":
+                return raw("pow", (binary("add", x, c),), Fraction(2))
+        return c
+
+    for form in ("add", "sub", "mul", "quotient", "reverse", "neg", "reciprocal", "square", "number"):
+        for outer in ("add", "sub", "mul"):
+            yield f"({form}) {outer} z", binary(outer, made(form), z)
+            yield f"z {outer} ({form})", binary(outer, z, made(form))
+            yield f"({form}) {outer} (add)", binary(outer, made(form), made("add"))
+            yield f"({form}) {outer} (sub)", binary(outer, made(form), made("sub"))
+            yield f"({form}) {outer} (neg)", binary(outer, made(form), made("neg"))
+        yield f"neg {form}", raw("neg", (made(form),))
+        yield f"neg neg {form}", raw("neg", (raw("neg", (made(form),)),))
+        yield f"1/({form})", raw("pow", (made(form),), Fraction(-1))
+        yield f"1/(1/({form}))", raw("pow", (raw("pow", (made(form),), Fraction(-1)),), Fraction(-1))
+        yield f"z/({form})", binary("mul", z, raw("pow", (made(form),), Fraction(-1)))
+        yield f"1/(z)/({form})", binary("mul", power(z, -1), raw("pow", (made(form),), Fraction(-1)))
+        yield f"sqrt({form})**2", raw("pow", (raw("pow", (call("abs", made(form)),), HALF),), Fraction(2))
+        yield f"({form})**2*z", binary("mul", raw("pow", (made(form),), Fraction(2)), z)
+        yield f"z/({form})**2", binary("mul", z, raw("pow", (raw("pow", (made(form),), Fraction(2)),), Fraction(-1)))
 
 
 @pytest.fixture(scope="module")
