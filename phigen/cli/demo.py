@@ -45,6 +45,7 @@ def command(console: Console, target: str) -> None:
     for order in ORDERS:
         compilation = compilation_of(source, order)
         solver = loaded(compilation, target, console)
+        target = solver.target  # said once, if it is not what was asked for
         trajectory, failure = integrated(solver, experiment, console)
         if failure:
             raise failure
