@@ -74,6 +74,14 @@ def test_no_step_of_a_long_run_stalls(name, factor):
     assert raw.integrate(factor * at.h, steps) == 0
 
 
+@pytest.mark.parametrize("target", TARGETS)
+def test_a_step_to_a_coordinate_near_zero_does_not_stall(target):
+    """y_3 = 2.7e-8: relative to that, corrections never get below 1e-11, which is their rounding."""
+    start = [-1.017117076849337, 0.9827338521080663, 0.0001490710425976643]
+    end = solver(compiled("poisson_not_hamiltonian"), target).step(start, 0.035)
+    assert np.max(np.abs(end - start)) < 0.1
+
+
 @pytest.mark.parametrize("factor", [10.0, 1e3, 1e8, -1e5, 1e200])
 @pytest.mark.parametrize("name", NAMES)
 def test_after_a_step_that_was_too_large_the_run_goes_on(name, factor):
