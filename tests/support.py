@@ -20,6 +20,9 @@ import pytest
 
 from phigen import resources, spec
 from phigen.compiler import Compilation, compile_spec, emit
+from phigen.geometry.system import System, system_from_spec
+from phigen.realisations.catalogue import realise
+from phigen.realisations.protocol import BiRealisation
 from phigen.runtime import cache as library_cache
 from phigen.runtime.c_solver import CSolver
 from phigen.runtime.interface import Interface
@@ -51,6 +54,14 @@ def compile_text(text: str, order: int | None = None) -> Compilation:
 def compiled(name: str, order: int | None = None) -> Compilation:
     """The compilation of a system of the corpus."""
     return compile_spec(plain(spec.load(resources.bundled_specs() / f"{name}.yaml")), order=order)
+
+
+@cache
+def described(name: str) -> tuple[spec.Spec, System, BiRealisation]:
+    """What is known of a system of the corpus before anything of its solver is made: quick, for choosing tests."""
+    found = spec.load(resources.bundled_specs() / f"{name}.yaml")
+    system = system_from_spec(found)
+    return found, system, realise(system, found.birealisation)
 
 
 _made: dict[tuple[Any, ...], tuple[Compilation, Any]] = {}

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from support import NAMES, RUNS, compiled, setting, solver, values
+from support import NAMES, RUNS, compiled, described, setting, solver, values
 
 from phigen.symbolic.expression import gradient
 
@@ -60,7 +60,7 @@ def test_casimirs_are_constant_to_round_off(name, run, trajectories):
         assert np.max(np.abs(found - found[0])) <= 1e-13 * scale, casimir
 
 
-@pytest.mark.parametrize("name", [name for name in NAMES if compiled(name).system.casimirs])
+@pytest.mark.parametrize("name", [name for name in NAMES if described(name)[1].casimirs])
 def test_casimirs_are_constant_to_round_off_in_numpy(name):
     compilation = compiled(name)
     at, steps = setting(compilation), 20 if compilation.program.driver == "path" else 200

@@ -14,6 +14,7 @@ from support import (
     RawC,
     compile_text,
     compiled,
+    described,
     setting,
     solver,
     tangent_by_differences,
@@ -24,7 +25,7 @@ REFERENCES = json.loads(Path(__file__).parents[1].joinpath("references.json").re
 EPSILON = 2.0**-52
 
 #: Systems whose α and β are formulas; those that follow a path are in tests/paths.
-IN_CLOSED_FORM = [name for name in NAMES if not compiled(name).realisation.path]
+IN_CLOSED_FORM = [name for name in NAMES if not described(name)[2].path]
 
 
 def state_after(compilation, at, steps):
@@ -137,7 +138,7 @@ def test_observables_agree_with_their_formulas(name):
 
 # -- reversibility
 
-REVERSIBLE = [name for name in NAMES if compiled(name).realisation.symmetric]
+REVERSIBLE = [name for name in NAMES if described(name)[2].symmetric]
 
 
 @pytest.mark.parametrize("name", REVERSIBLE)
@@ -188,7 +189,7 @@ def test_reference_state_is_reached(name, target):
     assert np.max(np.abs(end - state)) <= expected["tolerance"]
 
 
-EXACT = [(name, run) for name, run in RUNS if compiled(name).spec.runs[run].exact]
+EXACT = [(name, run) for name, run in RUNS if described(name)[0].runs[run].exact]
 
 
 @pytest.mark.parametrize(("name", "run"), EXACT)
