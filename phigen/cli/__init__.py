@@ -23,6 +23,7 @@ COMMANDS = {
     "check": ("phigen.cli.check", "Prove the mathematics of a spec, or refute it."),
     "build": ("phigen.cli.build", "Write the C and NumPy solvers of specs."),
     "run": ("phigen.cli.run", "Integrate an experiment of a spec and sum up what was conserved."),
+    "vendor": ("phigen.cli.vendor", "Copy solvers into another project, and check them there."),
     "verify": ("phigen.cli.verify", "Build every target and measure what the solvers promise."),
     "show": ("phigen.cli.show", "Show the formulas: π, Casimirs, α, β, S_1 … S_k."),
     "list": ("phigen.cli.list", "List the bundled specs."),

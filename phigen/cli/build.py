@@ -5,73 +5,29 @@ from __future__ import annotations
 import shlex
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from phigen.cli.console import Console, out, pass_console, verbosity
+from phigen.cli.console import Console, counted, indented, mend, out, pass_console, verbosity
 from phigen.cli.failures import Collector
-from phigen.cli.sources import CORRECTIONS, ORDER, load_all, many_specs
+from phigen.cli.generation import DIRECTORY, Options, files_of, output_options
+from phigen.cli.sources import load_all, many_specs
 from phigen.errors import CheckError
 
 if TYPE_CHECKING:
     from phigen.cli.outputs import Change
     from phigen.compiler import Compilation
-    from phigen.spec.model import Extras, Spec
-
-DIRECTORY = "generated"
 
 #: Beyond the flags of every local library: what phigen promises that its C passes.
 STRICT = ("-Wall", "-Wextra", "-Werror")
 
 
-@dataclass(frozen=True)
-class Options:
-    """The options of one run that reach the output, and where it goes."""
-
-    directory: Path = Path(DIRECTORY)
-    targets: tuple[str, ...] = ()
-    order: int | None = None
-    single_file: bool = False
-    tangent: bool = False
-    modified: int | None = None
-
-    def extras_of(self, spec: Spec) -> Extras:
-        """What the code offers beyond the solver: what the spec asks for, and the command line."""
-        from phigen.spec.model import Extras
-
-        tangent = self.tangent or spec.extras.tangent
-        return Extras(tangent, spec.extras.modified_hamiltonian if self.modified is None else self.modified)
-
-    def targets_of(self, compilation: Compilation) -> tuple[str, ...]:
-        """The targets to write: those of the command line, else those of the spec."""
-        return self.targets or compilation.spec.targets
-
-    def command(self, spec_files: Sequence[str]) -> str:
-        """The command line that writes the same files."""
-        words = ["phigen", "build", *spec_files]
-        if str(self.directory) != DIRECTORY:
-            words += ["-o", str(self.directory)]
-        words += [word for target in self.targets for word in ("-t", target)]
-        words += ["--order", str(self.order)] if self.order else []
-        words += ["--single-file"] if self.single_file else []
-        words += ["--tangent"] if self.tangent else []
-        words += ["--modified", str(self.modified)] if self.modified is not None else []
-        return shlex.join(words)
-
-
 @click.command("build")
 @many_specs
 @click.option("-o", "--output", metavar="DIR", default=DIRECTORY, show_default=True, help="Files go to DIR/NAME/.")
-@click.option(
-    "-t", "--target", "targets", multiple=True, type=click.Choice(["c", "numpy"]), help="Instead of the spec's targets."
-)
-@click.option("--order", type=ORDER, help="Order of the method, instead of the spec's.")
-@click.option("--single-file", is_flag=True, help="C in one file, NAME.c, without a header.")
-@click.option("--tangent", is_flag=True, help="Generate step_tangent, the derivative of a step, too.")
-@click.option("--modified", type=CORRECTIONS, metavar="N", help="Generate modified_hamiltonian, N corrections, too.")
+@output_options
 @click.option("--compile", "compiling", is_flag=True, help="Compile the C too, to DIR/NAME/libNAME.so.")
 @click.option("--certify", is_flag=True, help="Verify too, and write DIR/NAME/NAME.certificate.json.")
 @click.option(
@@ -110,7 +66,7 @@ def command(
         lone = _orphans(spec_files, compilations, options)
         _compare([*(c for _, changes in planned for c in changes), *lone], options.command(spec_files), diff)
         _expect_certificates(planned, options)
-        console.note(f"{_counted(len(planned), 'system')} up to date in {options.directory}")
+        console.note(f"{counted(len(planned), 'system')} up to date in {options.directory}")
         return
     _write(console, planned, options, force, compiling)
     if certify:
@@ -142,24 +98,10 @@ def _plan(
     result = []
     for compilation in compilations:
         name, start = compilation.spec.name, time.perf_counter()
-        files = _files(compilation, options)
+        files = files_of(compilation, options)
         console.detail(f"{name}: {time.perf_counter() - start:.2f} s emitting")
         result.append((compilation, changes(options.directory / name, name, files, options.targets or SUFFIXES)))
     return result
-
-
-def generate(compilation: Compilation, target: str, options: Options) -> dict[str, str]:
-    """The files of one target. Their header names a command that gives the same bytes on any machine."""
-    from phigen.compiler import emit
-
-    spec, single = compilation.spec, options.single_file and target == "c"
-    words = ["phigen build", f"{spec.name}.yaml"]
-    words += ["-t", target] if target not in spec.targets else []
-    words += ["--order", str(options.order)] if options.order not in (None, spec.order) else []
-    words += ["--single-file"] if single else []
-    words += ["--tangent"] if options.tangent and not spec.extras.tangent else []
-    words += ["--modified", str(options.modified)] if options.modified is not None else []
-    return emit(compilation.program, target, " ".join(words), single_file=single)
 
 
 def _orphans(spec_files: Sequence[str], compilations: Sequence[Compilation], options: Options) -> Iterator[Change]:
@@ -185,7 +127,7 @@ def _compare(planned: Sequence[Change], command: str, diff: bool) -> None:
     if len(off) > len(lone):
         forced = " --force" if any(c.obstacle for c in off) else ""
         remedies.insert(0, command + forced)
-    raise CheckError("\n".join([f"{_counted(len(off), 'file')} out of date", *_indented(lines), *_mend(remedies)]))
+    raise CheckError("\n".join([f"{counted(len(off), 'file')} out of date", *indented(lines), *mend(remedies)]))
 
 
 def _complaint(change: Change) -> str:
@@ -214,7 +156,7 @@ def _write(
     obstacles = [change.obstacle for _, changes in planned for change in changes if change.obstacle]
     if obstacles and not force:
         hint = "  hint: --diff shows the differences; --force overwrites"
-        raise CheckError("\n".join(["nothing was written", *_indented(obstacles), hint]))
+        raise CheckError("\n".join(["nothing was written", *indented(obstacles), hint]))
     for compilation, changes in planned:
         apply(changes)
         _report(console, options.directory / compilation.spec.name, compilation, changes)
@@ -243,7 +185,7 @@ def _certify(console: Console, compilations: Sequence[Compilation], options: Opt
             verification = verified(subject, None, False, console, options.targets_of(compilation))
             if verification.failures:
                 raise fallen_short(verification)
-            write(path, certificate.text_of(compilation, _files(compilation, options), verification))
+            write(path, certificate.text_of(compilation, files_of(compilation, options), verification))
             console.note(f"wrote {path}: {len(verification.checks)} measurements")
     collector.finish()
 
@@ -255,18 +197,10 @@ def _expect_certificates(planned: Sequence[tuple[Compilation, list[Change]]], op
     found = []
     for compilation, _ in planned:
         path = certificate.path_of(options.directory / compilation.spec.name, compilation.spec.name)
-        found.append(certificate.obsolete(path, compilation, _files(compilation, options)))
+        found.append(certificate.obsolete(path, compilation, files_of(compilation, options)))
     if any(found):
-        lines = ["certificates out of date", *_indented([f for f in found if f])]
+        lines = ["certificates out of date", *indented([f for f in found if f])]
         raise CheckError("\n".join([*lines, "  hint: build with --certify, or remove them"]))
-
-
-def _files(compilation: Compilation, options: Options) -> dict[str, str]:
-    """All files of a compilation."""
-    files: dict[str, str] = {}
-    for target in options.targets_of(compilation):
-        files |= generate(compilation, target, options)
-    return files
 
 
 def _report(console: Console, folder: Path, compilation: Compilation, changes: Sequence[Change]) -> None:
@@ -297,15 +231,3 @@ def _compile_library(console: Console, folder: Path, name: str) -> None:
 
 def _library(name: str) -> str:
     return f"lib{name}.so"
-
-
-def _indented(lines: Sequence[str]) -> list[str]:
-    return [f"  {line}" for line in lines]
-
-
-def _mend(commands: Sequence[str]) -> list[str]:
-    return ["to mend it:", *_indented(commands)]
-
-
-def _counted(number: int, noun: str) -> str:
-    return f"{number} {noun}{'' if number == 1 else 's'}"

@@ -90,6 +90,21 @@ def table(rows: Sequence[Sequence[str]], *, right: Sequence[int] = ()) -> list[s
     return lines
 
 
+def indented(lines: Sequence[str]) -> list[str]:
+    """The lines of a message below its first."""
+    return [f"  {line}" for line in lines]
+
+
+def mend(commands: Sequence[str]) -> list[str]:
+    """The end of a message: the commands that mend what it complains of."""
+    return ["to mend it:", *indented(commands)]
+
+
+def counted(number: int, noun: str) -> str:
+    """``3 files``."""
+    return f"{number} {noun}{'' if number == 1 else 's'}"
+
+
 def heading(text: str) -> str:
     """A heading on stdout, bold on a terminal."""
     return click.style(text, bold=True)

@@ -55,11 +55,11 @@ class Change:
 def changes(folder: Path, name: str, files: Mapping[str, str], targets: Iterable[str]) -> list[Change]:
     """What building NAME means for its folder: its files, and files of the same targets it no longer has."""
     _expect_own_folder(folder)
-    result = [Change(folder / file, _read(folder / file), text) for file, text in files.items()]
+    result = [Change(folder / file, read(folder / file), text) for file, text in files.items()]
     for suffix in (s for target in targets for s in SUFFIXES[target]):
         path = folder / f"{name}{suffix}"
         if path.name not in files and path.is_file():
-            before = _read(path)
+            before = read(path)
             if before is not None and split(before)[0] is not None:
                 result.append(Change(path, before, None))
     return result
@@ -71,7 +71,7 @@ def orphans(directory: Path, names: Iterable[str], targets: Iterable[str]) -> It
     suffixes = [s for target in targets for s in SUFFIXES[target]]
     for folder in sorted(directory.iterdir()) if directory.is_dir() else []:
         for path in [folder / f"{folder.name}{s}" for s in suffixes] if folder.name not in known else []:
-            before = _read(path)
+            before = read(path)
             if before is not None and split(before)[0] is not None:
                 yield Change(path, before, None)
 
@@ -110,7 +110,7 @@ def _mode(path: Path) -> int:
         return 0o666 & ~mask
 
 
-def _read(path: Path) -> str | None:
+def read(path: Path) -> str | None:
     """The text of a file, undecodable bytes replaced: such a file is not ours, which is all that matters."""
     try:
         return path.read_bytes().decode("utf-8", "replace")

@@ -187,7 +187,7 @@ def _code(compilation: Compilation) -> list[str]:
 
 
 def _files(compilation: Compilation) -> dict[str, str]:
-    from phigen.cli.build import Options, generate
+    from phigen.cli.generation import Options, generate
 
     files: dict[str, str] = {}
     for target in compilation.spec.targets:

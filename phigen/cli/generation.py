@@ -1,0 +1,105 @@
+"""What commands generate: the options that decide it, and the files they give."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import click
+
+from phigen.cli.sources import CORRECTIONS, ORDER
+
+if TYPE_CHECKING:
+    from phigen.compiler import Compilation
+    from phigen.spec.model import Extras, Spec
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+DIRECTORY = "generated"
+
+
+@dataclass(frozen=True)
+class Options:
+    """The options of one run that reach the output, and where it goes."""
+
+    directory: Path = Path(DIRECTORY)
+    targets: tuple[str, ...] = ()
+    order: int | None = None
+    single_file: bool = False
+    tangent: bool = False
+    modified: int | None = None
+
+    def extras_of(self, spec: Spec) -> Extras:
+        """What the code offers beyond the solver: what the spec asks for, and the command line."""
+        from phigen.spec.model import Extras
+
+        tangent = self.tangent or spec.extras.tangent
+        return Extras(tangent, spec.extras.modified_hamiltonian if self.modified is None else self.modified)
+
+    def targets_of(self, compilation: Compilation) -> tuple[str, ...]:
+        """The targets to write: those of the command line, else those of the spec."""
+        return self.targets or compilation.spec.targets
+
+    def command(self, spec_files: Sequence[str]) -> str:
+        """The command line that writes the same files."""
+        words = ["phigen", "build", *spec_files]
+        if str(self.directory) != DIRECTORY:
+            words += ["-o", str(self.directory)]
+        return shlex.join([*words, *self.words])
+
+    @property
+    def words(self) -> list[str]:
+        """The options that reach the output, as on the command line."""
+        words = [word for target in self.targets for word in ("-t", target)]
+        words += ["--order", str(self.order)] if self.order else []
+        words += ["--single-file"] if self.single_file else []
+        words += ["--tangent"] if self.tangent else []
+        words += ["--modified", str(self.modified)] if self.modified is not None else []
+        return words
+
+
+def output_options(command: F) -> F:
+    """The options that decide what is generated: those of `Options`."""
+    for option in (
+        click.option(
+            "--modified", type=CORRECTIONS, metavar="N", help="Generate modified_hamiltonian, N corrections, too."
+        ),
+        click.option("--tangent", is_flag=True, help="Generate step_tangent, the derivative of a step, too."),
+        click.option("--single-file", is_flag=True, help="C in one file, NAME.c, without a header."),
+        click.option("--order", type=ORDER, help="Order of the method, instead of the spec's."),
+        click.option(
+            "-t",
+            "--target",
+            "targets",
+            multiple=True,
+            type=click.Choice(["c", "numpy"]),
+            help="Instead of the spec's targets.",
+        ),
+    ):
+        command = option(command)
+    return command
+
+
+def generate(compilation: Compilation, target: str, options: Options) -> dict[str, str]:
+    """The files of one target. Their header names a command that gives the same bytes on any machine."""
+    from phigen.compiler import emit
+
+    spec, single = compilation.spec, options.single_file and target == "c"
+    words = ["phigen build", f"{spec.name}.yaml"]
+    words += ["-t", target] if target not in spec.targets else []
+    words += ["--order", str(options.order)] if options.order not in (None, spec.order) else []
+    words += ["--single-file"] if single else []
+    words += ["--tangent"] if options.tangent and not spec.extras.tangent else []
+    words += ["--modified", str(options.modified)] if options.modified is not None else []
+    return emit(compilation.program, target, " ".join(words), single_file=single)
+
+
+def files_of(compilation: Compilation, options: Options) -> dict[str, str]:
+    """All files of a compilation."""
+    files: dict[str, str] = {}
+    for target in options.targets_of(compilation):
+        files |= generate(compilation, target, options)
+    return files

@@ -1,0 +1,157 @@
+"""The manifest of a folder of vendored solvers: from what, by which options and which phigen each was made.
+
+It is a function of the specs, the options and the version: no date, no host, and no path but those of specs relative
+to the folder. The text of each spec is in it, so that a solver can be made again where the spec is not at hand.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import re
+import shlex
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from phigen._version import __version__
+from phigen.cli.generation import Options
+from phigen.errors import CheckError
+from phigen.spec import limits
+from phigen.spec.names import SPEC_NAME
+
+FILE = "phigen-vendor.json"
+FORMAT = 1
+
+_ABOUT = (
+    "Solvers made by phigen; commands are for this folder. To check that they are unmodified and current: "
+    "phigen vendor --check . To make them again: phigen vendor ."
+)
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One vendored solver. ``spec_file`` is relative to the folder, None for a spec that is far from it.
+
+    ``files`` maps names to the sha256 of their bytes.
+    """
+
+    name: str
+    options: Options
+    spec_file: str | None
+    spec_text: str
+    licence: str
+    files: Mapping[str, str]
+    version: str
+
+    @property
+    def command(self) -> str:
+        """The command that makes it again, for the folder itself."""
+        return shlex.join(["phigen", "vendor", *([self.spec_file] if self.spec_file else []), ".", *self._words])
+
+    @property
+    def _words(self) -> list[str]:
+        return self.options.words if self.spec_file else []
+
+    def described(self) -> dict[str, Any]:
+        """The entry as plain data; options that were not given are left out."""
+        given = {
+            key: value for key, value in asdict(self.options).items() if key != "directory" and value != _UNSET[key]
+        }
+        spec = {"sha256": sha256(self.spec_text), "text": self.spec_text.split("\n")}
+        return {
+            "phigen": self.version,
+            "command": self.command,
+            "options": given,
+            "license": self.licence,
+            "spec": {"file": self.spec_file, **spec} if self.spec_file else spec,
+            "files": dict(sorted(self.files.items())),
+        }
+
+
+_UNSET = asdict(Options())
+
+
+def sha256(content: str | bytes) -> str:
+    """The hash of a file: of its bytes, for text those of UTF-8."""
+    return hashlib.sha256(content.encode() if isinstance(content, str) else content).hexdigest()
+
+
+def relative(spec_file: str, folder: Path) -> str | None:
+    """The path of a spec as seen from the folder, None if it leads through the root or somebody's home.
+
+    Such a path means nothing on another machine.
+    """
+    source, target = Path(os.path.abspath(spec_file)), Path(os.path.abspath(folder))  # noqa: PTH100  (".." as text)
+    common = Path(os.path.commonpath([source, target]))
+    if common == Path(common.anchor) or Path("~").expanduser().is_relative_to(common):
+        return None
+    return Path(os.path.relpath(source, target)).as_posix()
+
+
+def text_of(entries: Mapping[str, Entry]) -> str:
+    """The manifest as JSON."""
+    solvers = {name: entry.described() for name, entry in sorted(entries.items())}
+    return json.dumps({"manifest": FORMAT, "about": _ABOUT, "solvers": solvers}, indent=2, ensure_ascii=False) + "\n"
+
+
+def read(folder: Path) -> dict[str, Entry]:
+    """The entries of a folder's manifest, none if there is no manifest. Raises `CheckError` if it is damaged."""
+    path = folder / FILE
+    try:
+        data = json.loads(path.read_text(encoding="utf-8"))
+    except (FileNotFoundError, NotADirectoryError):
+        return {}
+    except ValueError as error:
+        raise _damaged(path, f"it is not JSON: {error}") from None
+    if not isinstance(data, dict) or data.get("manifest") != FORMAT:
+        raise _damaged(path, f"it is not a manifest of format {FORMAT}, the one that phigen {__version__} reads")
+    try:
+        return {name: _entry(name, part) for name, part in data["solvers"].items()}
+    except (KeyError, TypeError, AttributeError, ValueError) as error:
+        what = f"{error} is missing" if isinstance(error, KeyError) else str(error)
+        raise _damaged(path, what) from None
+
+
+def _entry(name: str, part: Mapping[str, Any]) -> Entry:
+    spec, options = part["spec"], dict(part["options"])
+    lines: list[str] = _list_of_texts(spec["text"])
+    text, spec_file = "\n".join(lines), spec.get("file")
+    if sha256(text) != spec["sha256"]:
+        raise ValueError(f"{name}: the text of its spec was changed")
+    # Names from here are opened, written and removed.
+    if not re.fullmatch(SPEC_NAME, name) or not (spec_file is None or isinstance(spec_file, str)):
+        raise ValueError(f"{name!r} is no name of a solver, or its spec no file")
+    files = {str(file): str(digest) for file, digest in part["files"].items()}
+    for file in files:
+        if not re.fullmatch(rf"{name}\.(c|h|py)", file):
+            raise ValueError(f"{name}: {file!r} is no file of that solver")
+    return Entry(name, _options(name, options), spec_file, text, str(part["license"]), files, str(part["phigen"]))
+
+
+def _options(name: str, given: dict[str, Any]) -> Options:
+    targets = tuple(_list_of_texts(given.pop("targets", [])))
+    options = Options(targets=targets, **given)
+    order, modified = options.order, options.modified
+    if (
+        not set(targets) <= {"c", "numpy"}
+        or not (order is None or (type(order) is int and 1 <= order <= limits.ORDER))
+        or not (modified is None or (type(modified) is int and 0 <= modified <= limits.CORRECTIONS))
+        or "directory" in given
+        or not all(isinstance(flag, bool) for flag in (options.single_file, options.tangent))
+    ):
+        raise ValueError(f"{name}: options that do not exist: {given}")
+    return options
+
+
+def _list_of_texts(value: Any) -> list[str]:
+    if not isinstance(value, list) or not all(isinstance(v, str) for v in value):
+        raise TypeError(f"{value!r} is no list of texts")
+    return value
+
+
+def _damaged(path: Path, why: str) -> CheckError:
+    hint = f"take {FILE} from version control, or remove it and vendor the solvers anew"
+    return CheckError(f"{path} cannot be used: {why}\n  hint: {hint}")

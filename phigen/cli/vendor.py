@@ -1,0 +1,307 @@
+"""``phigen vendor``: solvers copied into another project, with a manifest by which they can be checked."""
+
+from __future__ import annotations
+
+import os
+import shlex
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from phigen._version import __version__
+from phigen.cli import manifest
+from phigen.cli.console import Console, counted, indented, mend, pass_console, verbosity
+from phigen.cli.failures import Collector
+from phigen.cli.generation import Options, files_of, output_options
+from phigen.cli.manifest import Entry
+from phigen.cli.sources import SUFFIXES, load_all
+from phigen.errors import CheckError
+
+if TYPE_CHECKING:
+    from phigen.cli.outputs import Change
+    from phigen.compiler import Compilation
+    from phigen.spec.model import Spec
+
+
+@dataclass(frozen=True)
+class Order:
+    """One solver to vendor or to check: its spec, from where, and the options.
+
+    ``found`` is false if the text of the spec comes from the manifest, because its file is not there.
+    """
+
+    spec: Spec
+    spec_file: str | None
+    options: Options
+    found: bool = True
+
+
+@dataclass(frozen=True)
+class Made:
+    """What belongs in the folder for one order."""
+
+    order: Order
+    compilation: Compilation
+    files: Mapping[str, str]
+
+    @property
+    def entry(self) -> Entry:
+        """Its entry of the manifest."""
+        spec, order = self.order.spec, self.order
+        files = {file: manifest.sha256(text) for file, text in self.files.items()}
+        return Entry(spec.name, order.options, order.spec_file, spec.source, spec.license, files, __version__)
+
+
+@click.command("vendor")
+@click.argument("paths", metavar="[SPEC...] DEST", nargs=-1, required=True, type=click.Path())
+@output_options
+@click.option("--check", "checking", is_flag=True, help="Write nothing; fail if a file is not as it should be.")
+@click.option("--force", is_flag=True, help="Overwrite files that were edited by hand or are not phigen's.")
+@verbosity
+@pass_console
+def command(
+    console: Console,
+    paths: tuple[str, ...],
+    targets: tuple[str, ...],
+    order: int | None,
+    single_file: bool,
+    tangent: bool,
+    modified: int | None,
+    checking: bool,
+    force: bool,
+) -> None:
+    """Copy solvers into the folder DEST of another project, and check them there later.
+
+    The files NAME.h, NAME.c, NAME.py are those of `phigen build`. DEST/phigen-vendor.json tells from which spec,
+    options and version they were made. Without SPEC, the solvers that are in DEST already are made again.
+
+    With --check: whether they are unmodified and what phigen makes of their specs now; without SPEC, all of DEST.
+    Where a spec is not there any more, whether it has changed cannot be told, and that is said.
+    """
+    *spec_files, last = paths
+    folder = Path(last)
+    _expect_folder(folder, spec_files, checking)
+    options = Options(
+        targets=tuple(dict.fromkeys(targets)), order=order, single_file=single_file, tangent=tangent, modified=modified
+    )
+    if options.words and not spec_files:
+        raise click.UsageError("options that change what is generated need the SPEC; without it, the manifest decides")
+    entries, collector = manifest.read(folder), Collector()
+    orders = _from_specs(spec_files, folder, options, entries, checking, collector)
+    if not spec_files:
+        orders = _from_manifest(folder, entries, collector)
+    made = [m for m in (_made(order, collector) for order in orders) if m]
+    if checking:
+        problems = [p for m in made for p in _problems(folder, entries, m, spec_files)]
+        problems += [] if spec_files else _extra(folder, entries)
+        with collector.collecting():
+            _judge(folder, problems)
+        collector.finish()
+        _report_check(console, folder, made)
+        return
+    collector.finish()
+    _write(console, folder, entries, made, force)
+
+
+def _expect_folder(folder: Path, spec_files: Sequence[str], checking: bool) -> None:
+    if folder.is_file() or (folder.suffix in SUFFIXES and not folder.is_dir()):
+        words = shlex.join(["phigen", "vendor", *spec_files, str(folder), "DEST"])
+        raise click.UsageError(f"{folder} is no folder; the last argument is where the solvers go: {words}")
+    if (folder / manifest.FILE).is_file():
+        return
+    message = f"{folder} holds no solvers that were vendored: there is no {folder / manifest.FILE}"
+    if checking:
+        words = shlex.join(["phigen", "vendor", *(spec_files or ["SPEC"]), str(folder)])
+        raise CheckError(f"{message}\n  hint: {words} puts one there")
+    if not spec_files:
+        raise click.UsageError(f"{message}; to put one there: phigen vendor SPEC {folder}")
+
+
+def _from_specs(
+    spec_files: Sequence[str],
+    folder: Path,
+    options: Options,
+    entries: Mapping[str, Entry],
+    checking: bool,
+    collector: Collector,
+) -> list[Order]:
+    """The orders of the command line. A check without options is about those of the manifest."""
+    orders = []
+    for spec in load_all(spec_files, collector) if spec_files else []:
+        known = entries.get(spec.name)
+        chosen = known.options if checking and known and not options.words else options
+        orders.append(Order(spec, manifest.relative(spec.file, folder), chosen))
+    return orders
+
+
+def _from_manifest(folder: Path, entries: Mapping[str, Entry], collector: Collector) -> list[Order]:
+    """The orders of all that is in the folder, from the specs where they are, else from the manifest's copies."""
+    from phigen import spec as specs
+
+    orders = []
+    for name, entry in entries.items():
+        with collector.collecting():
+            path = _path_of_spec(folder, entry)
+            if path is None:
+                copy = specs.loads(entry.spec_text, f"{folder / manifest.FILE}({name})")
+                orders.append(Order(copy, entry.spec_file, entry.options, found=False))
+                continue
+            spec = specs.load(path)
+            if spec.name != name:
+                raise CheckError(f"{path} is the spec of {spec.name} now; {name} in {folder} was made from it")
+            orders.append(Order(spec, entry.spec_file, entry.options))
+    return orders
+
+
+def _path_of_spec(folder: Path, entry: Entry) -> Path | None:
+    """The file of a spec, as seen from the working directory, if it is there."""
+    if entry.spec_file is None:
+        return None
+    path = Path(os.path.normpath(folder / entry.spec_file))
+    return path if path.is_file() else None
+
+
+def _made(order: Order, collector: Collector) -> Made | None:
+    from phigen.analysis.proof import compile_proved
+
+    options = order.options
+    with collector.collecting():
+        compilation = compile_proved(order.spec, order=options.order, extras=options.extras_of(order.spec))
+        return Made(order, compilation, files_of(compilation, options))
+    return None
+
+
+# -- writing
+
+
+def _write(console: Console, folder: Path, entries: dict[str, Entry], made: Sequence[Made], force: bool) -> None:
+    from phigen.cli.outputs import Change, apply, read
+
+    planned: list[tuple[Made, list[Change]]] = []
+    for m in made:
+        known = entries.get(m.order.spec.name)
+        changes = [Change(folder / file, read(folder / file), text) for file, text in m.files.items()]
+        left = [folder / file for file in (known.files if known else ()) if file not in m.files]
+        changes += [Change(path, before, None) for path in left if (before := read(path)) is not None]
+        planned.append((m, changes))
+    obstacles = [o for m, changes in planned for c in changes if (o := _obstacle(c, entries.get(m.order.spec.name)))]
+    if obstacles and not force:
+        raise CheckError("\n".join(["nothing was written", *indented(obstacles), "  hint: --force overwrites"]))
+    for m, changes in planned:
+        apply(changes)
+        console.note(_done(folder, m, changes))
+    text = manifest.text_of({**entries, **{m.order.spec.name: m.entry for m in made}})
+    apply([Change(folder / manifest.FILE, read(folder / manifest.FILE), text)])
+
+
+def _obstacle(change: Change, known: Entry | None) -> str:
+    """Why a file must not be touched. The manifest knows of edits in headers too, which the checksums do not cover."""
+    if change.obstacle or change.before is None or change.before == change.after:
+        return change.obstacle
+    stated = known.files.get(change.path.name) if known else None
+    edited = stated is not None and stated != manifest.sha256(change.before)
+    return f"{change.path} was edited by hand after phigen generated it" if edited else ""
+
+
+def _done(folder: Path, made: Made, changes: Sequence[Change]) -> str:
+    written = [c.path.name for c in changes if c.state in ("missing", "different")]
+    removed = [c.path.name for c in changes if c.state == "stale"]
+    said = [f"wrote {', '.join(written)}"] if written else []
+    said += [f"removed {', '.join(removed)}"] if removed else []
+    said = said or [f"{made.order.spec.name} unchanged"]
+    if not made.order.found:
+        said.append("from the manifest's copy of the spec, whose file is not there")
+    return f"{folder}: {'; '.join(said)} (order {made.compilation.program.order}, {made.compilation.realisation.kind})"
+
+
+# -- checking
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One file that is not as it should be: its path, what is wrong, and the command that mends it."""
+
+    path: Path
+    what: str
+    remedy: str
+
+
+def _problems(folder: Path, entries: Mapping[str, Entry], made: Made, spec_files: Sequence[str]) -> Iterator[Problem]:
+    """What is wrong with the files of one solver."""
+    order = made.order
+    words = [order.spec.file, str(folder), *order.options.words] if spec_files else [str(folder)]
+    known = entries.get(order.spec.name)
+    for file in sorted({*made.files, *(known.files if known else ())}):
+        path = folder / file
+        what, edited = _complaint(path, known, made)
+        if what:
+            yield Problem(path, what, shlex.join(["phigen", "vendor", *words, *(["--force"] if edited else [])]))
+
+
+def _complaint(path: Path, known: Entry | None, made: Made) -> tuple[str, bool]:
+    """What is wrong with a file, empty if nothing; and whether it holds work of somebody's own."""
+    content = path.read_bytes() if path.is_file() else None
+    stated, expected = known.files.get(path.name) if known else None, made.files.get(path.name)
+    if content is None:
+        return ("missing", False) if expected is not None else ("missing, and its spec no longer gives it", False)
+    if stated is None:
+        return "not in the manifest", content != (expected or "").encode()
+    if manifest.sha256(content) != stated:
+        if manifest.sha256(content.replace(b"\r\n", b"\n")) == stated:
+            return "its line endings were changed; for git, put '* -text' into .gitattributes beside it", True
+        return "edited by hand", True
+    if expected is None:
+        return "its spec no longer gives it", False
+    return ("" if content == expected.encode() else f"stale: {_cause(known, made)}"), False
+
+
+def _cause(known: Entry | None, made: Made) -> str:
+    """Why phigen makes something else now."""
+    causes = []
+    if known and known.spec_text != made.order.spec.source:
+        causes.append("its spec has changed")
+    if known and known.version != __version__:
+        causes.append(f"it was generated by phigen {known.version}, and this is {__version__}")
+    if known and known.options != made.order.options:
+        causes.append("it was generated with other options")
+    return "; ".join(causes) or "phigen makes something else of its spec"
+
+
+def _extra(folder: Path, entries: Mapping[str, Entry]) -> Iterator[Problem]:
+    """Generated files that the manifest does not know; others are the user's."""
+    from phigen.cli.outputs import SUFFIXES as OUTPUTS
+    from phigen.cli.outputs import read
+    from phigen.targets.header import split
+
+    known = {file for entry in entries.values() for file in entry.files}
+    suffixes = [s for listed in OUTPUTS.values() for s in listed]
+    for path in sorted(folder.iterdir()):
+        if path.suffix in suffixes and path.is_file() and path.name not in known and split(read(path) or "")[0]:
+            yield Problem(path, "extra: generated, but not in the manifest", shlex.join(["rm", str(path)]))
+
+
+def _judge(folder: Path, problems: Sequence[Problem]) -> None:
+    """Raise CheckError that lists the problems and how to mend them."""
+    if not problems:
+        return
+    lines = [f"{p.path}: {p.what}" for p in problems]
+    remedies = list(dict.fromkeys(p.remedy for p in problems))
+    remedies = [r for r in remedies if f"{r} --force" not in remedies]
+    head = f"{counted(len(problems), 'vendored file')} not as it should be in {folder}"
+    raise CheckError("\n".join([head, *indented(lines), *mend(remedies)]))
+
+
+def _report_check(console: Console, folder: Path, made: Sequence[Made]) -> None:
+    gone = [m.order for m in made if not m.order.found]
+    for order in gone:
+        where = os.path.normpath(folder / order.spec_file) if order.spec_file else "far from here"
+        console.note(
+            f"{order.spec.name}: its spec ({where}) is not there: whether that has changed cannot be checked; "
+            "the files are what phigen makes of its copy in the manifest"
+        )
+    files = counted(sum(len(m.files) for m in made), "file")
+    verdict = "unmodified" + ("" if gone else " and current")
+    console.note(f"{folder}: {counted(len(made), 'solver')}, {files}: {verdict}")

@@ -1,0 +1,257 @@
+"""``phigen vendor``: what is copied, what the manifest says, and what --check notices."""
+
+import json
+import shlex
+from pathlib import Path
+
+import pytest
+
+from phigen.cli import manifest
+
+EXT = Path("project/ext")
+
+
+def tree(folder=EXT):
+    return {p.name: p.read_bytes() for p in sorted(Path(folder).iterdir())}
+
+
+def solvers(folder=EXT):
+    return json.loads((folder / manifest.FILE).read_text())["solvers"]
+
+
+def edit(file, before, after):
+    path = EXT / file
+    path.write_text(path.read_text().replace(before, after, 1))
+
+
+@pytest.fixture
+def vendored(phigen, write):
+    """Two solvers in one folder, of specs beside it; gives the function that checks the folder."""
+    assert phigen("vendor", write("models/a.yaml"), write("models/b.yaml"), EXT, "-t", "c").exit_code == 0
+
+    def check(*specs):
+        before = tree()
+        done = phigen("vendor", "--check", *specs, EXT)
+        assert tree() == before
+        assert done.stdout == ""
+        return done
+
+    return check
+
+
+def test_files_are_those_of_build_and_one_manifest_lists_them(phigen, vendored):
+    phigen("build", "models", "-t", "c")
+    assert sorted(tree()) == ["a.c", "a.h", "b.c", "b.h", manifest.FILE]
+    for name, file in (("a", "a.c"), ("b", "b.h")):
+        content = tree()[file]
+        assert content == (Path("generated") / name / file).read_bytes()
+        assert solvers()[name]["files"][file] == manifest.sha256(content)
+    assert "2 solvers, 4 files: unmodified and current" in vendored().stderr
+    assert "1 solver, 2 files" in vendored("models/b.yaml").stderr
+
+
+def test_manifest_depends_on_specs_and_options_alone(phigen, write, monkeypatch):
+    write("one/models/a.yaml")
+    write("elsewhere/two/models/a.yaml")
+    for place in ("one", "elsewhere/two"):
+        phigen("vendor", f"{place}/models/a.yaml", f"{place}/project/ext", "--order", "4")
+    first, second = (tree(f"{place}/project/ext") for place in ("one", "elsewhere/two"))
+    assert first == second
+    assert str(Path.cwd()).encode() not in first[manifest.FILE]
+
+
+@pytest.mark.parametrize("options", ["", " -t c --order 4 --single-file --tangent --modified 1"])
+def test_command_of_the_manifest_makes_the_same_bytes(phigen, write, options, monkeypatch):
+    phigen("vendor", *options.split(), write("models/a.yaml"), EXT)
+    before = tree()
+    command = solvers()["a"]["command"]
+    assert command == f"phigen vendor ../../models/a.yaml .{options}"
+    monkeypatch.chdir(EXT)
+    for file in before:
+        Path(file).unlink()
+    assert phigen(*shlex.split(command)[1:]).exit_code == 0
+    assert tree(".") == before
+
+
+def test_path_through_the_home_of_somebody_is_not_recorded(phigen, write, monkeypatch):
+    monkeypatch.setenv("HOME", str(Path.cwd()))
+    assert phigen("vendor", write("models/a.yaml"), EXT).exit_code == 0
+    assert "file" not in solvers()["a"]["spec"]
+    (EXT / "a.h").unlink()
+    assert phigen("vendor", EXT).exit_code == 0
+    assert phigen("vendor", "--check", EXT).exit_code == 0
+    Path("models/a.yaml").write_text(Path("models/a.yaml").read_text() + "# more\n")
+    assert "a.c: stale: its spec has changed" in phigen("vendor", "--check", "models/a.yaml", EXT).stderr
+
+
+def damage_body():
+    edit("a.c", "return", "return ")
+
+
+def damage_header():
+    edit("a.h", "0BSD", "MIT")
+
+
+def damage_missing():
+    (EXT / "b.c").unlink()
+
+
+def damage_extra():
+    (EXT / "gone.c").write_bytes((EXT / "a.c").read_bytes())
+
+
+def damage_spec():
+    write_order("b", 4)
+
+
+def damage_targets():
+    spec = Path("models/a.yaml")
+    spec.write_text(spec.read_text() + "tangent: true\n")
+
+
+def damage_line_endings():
+    path = EXT / "a.c"
+    path.write_bytes(path.read_bytes().replace(b"\n", b"\r\n"))
+
+
+def write_order(name, order):
+    spec = Path(f"models/{name}.yaml")
+    spec.write_text(spec.read_text().replace("order: 2", f"order: {order}"))
+
+
+DAMAGES = {
+    damage_body: ("a.c: edited by hand", "project/ext --force"),
+    damage_header: ("a.h: edited by hand", "project/ext --force"),
+    damage_missing: ("b.c: missing", "project/ext"),
+    damage_extra: ("gone.c: extra", "rm project/ext/gone.c"),
+    damage_spec: ("b.h: stale: its spec has changed", "project/ext"),
+    damage_targets: ("a.c: stale: its spec has changed", "project/ext"),
+    damage_line_endings: ("a.c: its line endings were changed", "project/ext --force"),
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
+def test_check_names_the_file_what_is_wrong_and_the_command_that_mends(phigen, vendored, damage):
+    what, remedy = DAMAGES[damage]
+    damage()
+    done = vendored()
+    assert done.exit_code == 5
+    assert what in done.stderr
+    commands = [line.strip() for line in done.stderr.split("to mend it:\n")[1].splitlines()]
+    assert [c.endswith(remedy) for c in commands] == [True]
+    words = shlex.split(commands[0])
+    if words[0] == "rm":
+        Path(words[1]).unlink()
+    else:
+        assert phigen(*words[1:]).exit_code == 0
+    assert vendored().exit_code == 0
+
+
+def test_check_of_a_spec_mends_with_its_options_and_leaves_others_alone(phigen, vendored):
+    write_order("a", 4)
+    damage_missing()
+    assert vendored("models/b.yaml").stderr.splitlines()[1:2] == ["  project/ext/b.c: missing"]
+    done = vendored("models/a.yaml")
+    assert "phigen vendor models/a.yaml project/ext -t c\n" in done.stderr
+    assert "b.c" not in done.stderr
+
+
+def test_another_version_makes_files_stale(phigen, write, monkeypatch):
+    with monkeypatch.context() as patch:
+        patch.setattr("phigen.scheme.program.__version__", "0.0.9")
+        patch.setattr("phigen.cli.vendor.__version__", "0.0.9")
+        phigen("vendor", write("a.yaml"), EXT)
+    assert solvers()["a"]["phigen"] == "0.0.9"
+    from phigen import __version__
+
+    done = phigen("vendor", "--check", EXT)
+    assert done.exit_code == 5
+    assert f"a.c: stale: it was generated by phigen 0.0.9, and this is {__version__}" in done.stderr
+    assert phigen("vendor", EXT).exit_code == 0
+    assert phigen("vendor", "--check", EXT).exit_code == 0
+
+
+def test_without_its_spec_a_solver_is_checked_against_the_copy_and_that_is_said(phigen, vendored):
+    Path("models").rename("moved")
+    done = vendored()
+    assert done.exit_code == 0
+    assert "a: its spec (models/a.yaml) is not there: whether that has changed cannot be checked" in done.stderr
+    assert "unmodified and current" not in done.stderr
+    damage_body()
+    assert vendored().exit_code == 5
+    assert "from the manifest's copy" in phigen("vendor", EXT, "--force").stderr
+    assert vendored().exit_code == 0
+    assert solvers()["a"]["spec"]["file"] == "../../models/a.yaml"
+
+
+def test_edited_and_foreign_files_are_not_overwritten(phigen, vendored):
+    damage_header()
+    write_order("a", 4)
+    (EXT / "b.py").write_text("mine = 1\n")
+    before = tree()
+    done = phigen("vendor", "models", EXT)
+    assert done.exit_code == 5
+    assert "a.h was edited by hand" in done.stderr
+    assert "b.py was not generated by phigen" in done.stderr
+    assert tree() == before
+    assert phigen("vendor", "models", EXT, "--force").exit_code == 0
+    assert vendored().exit_code == 0
+
+
+def test_files_of_a_target_that_is_dropped_go_and_those_of_the_user_stay(phigen, write):
+    phigen("vendor", write("a.yaml"), EXT)
+    (EXT / "notes.py").write_text("x = 1\n")
+    done = phigen("vendor", "a.yaml", EXT, "-t", "c", "--single-file")
+    assert "removed a.h, a.py" in done.stderr
+    assert sorted(tree()) == ["a.c", "notes.py", manifest.FILE]
+    assert phigen("vendor", "--check", EXT).exit_code == 0
+
+
+def test_second_time_leaves_files_alone(phigen, vendored):
+    before = [p.stat().st_mtime_ns for p in EXT.iterdir()]
+    assert "a unchanged" in phigen("vendor", EXT).stderr
+    assert "need the SPEC" in phigen("vendor", EXT, "--order", "4").stderr
+    assert [p.stat().st_mtime_ns for p in EXT.iterdir()] == before
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "told"),
+    [
+        ('"manifest": 1', '"manifest": 2', "format 1"),
+        ('"manifest"', '"manifest', "not JSON"),
+        ('"a.c"', '"../a.c"', "'../a.c' is no file of that solver"),
+        ('"order: 2"', '"order: 4"', "the text of its spec was changed"),
+        ('"options"', '"choices"', "'options' is missing"),
+        ('"targets"', '"directory"', "options that do not exist"),
+    ],
+)
+def test_damaged_manifest_is_refused(phigen, vendored, before, after, told):
+    edit(manifest.FILE, before, after)
+    for done in (phigen("vendor", EXT), phigen("vendor", "--check", EXT)):
+        assert done.exit_code == 5
+        assert told in done.stderr
+        assert "hint: take phigen-vendor.json from version control" in done.stderr
+
+
+def test_spec_file_that_became_another_system_is_noticed(phigen, vendored):
+    Path("models/b.yaml").replace("models/a.yaml")
+    done = vendored()
+    assert done.exit_code == 5
+    assert "models/a.yaml is the spec of b now; a in project/ext was made from it" in done.stderr
+
+
+def test_wrong_usage_is_explained(phigen, write):
+    write("a.yaml")
+    write("b.yaml")
+    for words, told in (
+        (["a.yaml"], "phigen vendor a.yaml DEST"),
+        (["a.yaml", "b.yaml"], "phigen vendor a.yaml b.yaml DEST"),
+        (["a.yaml", "new.yaml"], "new.yaml is no folder"),
+        (["nothing"], "to put one there: phigen vendor SPEC nothing"),
+    ):
+        done = phigen("vendor", *words)
+        assert done.exit_code == 2
+        assert told in done.stderr
+    assert phigen("vendor", "--check", "nothing").exit_code == 5
+    assert phigen("vendor", "a.yaml", "c.yaml", "ext").exit_code == 1
+    assert not Path("ext").exists()
