@@ -82,15 +82,23 @@ def summarise(
 
 def drift(values: Floats, scale: float = 1.0) -> Drift:
     """The drift of the values of one quantity along a trajectory."""
-    start = float(values[0])
-    relative = abs(start) > _NEGLIGIBLE * scale
-    errors = np.abs(values - start) / (abs(start) if relative else 1.0)
+    errors, relative = errors_of(values, scale)
     growth = float("nan")
     if len(errors) >= 2 * WINDOWS:
         windows = [float(np.max(part)) for part in np.array_split(errors[1:], WINDOWS)]
         growth = windows[-1] / windows[0] if windows[0] > 0 else float("nan")
     finite = errors[np.isfinite(errors)]
     return Drift(float(np.max(finite, initial=0.0)) if len(finite) == len(errors) else float("inf"), relative, growth)
+
+
+def errors_of(values: Floats, scale: float = 1.0) -> tuple[Floats, bool]:
+    """The errors (rows,) of a conserved quantity, and whether they are relative to its initial value.
+
+    They are absolute if that is negligible beside ``scale``, the largest coordinate.
+    """
+    start = float(values[0])
+    relative = abs(start) > _NEGLIGIBLE * scale
+    return np.abs(values - start) / (abs(start) if relative else 1.0), relative
 
 
 def exact_solution(

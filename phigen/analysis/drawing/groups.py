@@ -1,0 +1,53 @@
+"""Which coordinates belong together in a picture, by their names: (q, p), (x1, y1), (P1, P2, P3), …"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+
+Group = tuple[str, ...]
+
+
+def groups(coordinates: Sequence[str]) -> list[Group]:
+    """The coordinates in groups of up to three, in their order; a coordinate alone is drawn against the time.
+
+    Up to three coordinates are one group. Otherwise, positions are paired with the momenta named after them (q and p,
+    q1 and p1, x and px); if there are none such, neighbours with the same letters or the same number make a group.
+    """
+    names = tuple(coordinates)
+    if len(names) <= 3:
+        return [names]
+    pairs: list[Group] = [(q, p) for q in names if (p := _momentum(q, names))]
+    if 2 * len(pairs) == len(names):
+        return pairs
+    return [part for run in _runs(names) for part in _parts(run)]
+
+
+def _momentum(q: str, names: Group) -> str | None:
+    candidates = [f"p{q}", f"p_{q}", f"p{q[1:]}" if q.startswith("q") else ""]
+    return next((p for p in candidates if p in names), None)
+
+
+def _runs(names: Group) -> list[Group]:
+    """Neighbours of one kind: the same letters, or the same number after them, whichever makes fewer runs."""
+    by_letters = _split(names, lambda name: re.sub(r"[\d_]+$", "", name))
+    by_number = _split(names, lambda name: name[len(re.sub(r"\d+$", "", name)) :])
+    return min(by_number, by_letters, key=len)
+
+
+def _split(names: Group, kind: Callable[[str], str]) -> list[Group]:
+    runs: list[list[str]] = []
+    for name in names:
+        if runs and kind(runs[-1][-1]) == kind(name):
+            runs[-1].append(name)
+        else:
+            runs.append([name])
+    return [tuple(run) for run in runs]
+
+
+def _parts(run: Group) -> list[Group]:
+    """A run in threes if it starts like a place in space or comes out even, else in twos, with one three if odd."""
+    if run[:3] == ("x", "y", "z") or len(run) % 3 == 0:
+        return [run[i : i + 3] for i in range(0, len(run), 3)]
+    first = 3 if len(run) % 2 and len(run) > 1 else 0
+    return [run[:first]] * bool(first) + [run[i : i + 2] for i in range(first, len(run), 2)]

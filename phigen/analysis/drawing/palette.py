@@ -1,0 +1,122 @@
+"""How figures look: colours, fonts, and writing them so that their bytes depend on their content alone."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from functools import wraps
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
+
+from phigen.errors import ToolchainError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+P = ParamSpec("P")
+T = TypeVar("T")
+
+#: The role of each colour. No two are equal, and SVG files contain them literally, so that a page can replace them by
+#: variables of its own. Those of the series have a contrast of 3 and more on white as well as on black, and are told
+#: apart with every kind of colour vision (Okabe and Ito, the light ones darkened).
+PALETTE: Mapping[str, str] = {
+    "paper": "#ffffff",
+    "ink": "#24292f",
+    "muted": "#6e7781",
+    "grid": "#d0d7de",
+    "leaf": "#8b98a9",
+    "series-1": "#0072b2",
+    "series-2": "#d55e00",
+    "series-3": "#009e73",
+    "series-4": "#cc79a7",
+    "series-5": "#a6761d",
+    "series-6": "#7a7a7a",
+}
+SERIES = tuple(colour for role, colour in PALETTE.items() if role.startswith("series"))
+
+#: Files that figures are written to.
+SUFFIXES = (".png", ".svg", ".pdf")
+
+_STYLE: Any = {
+    "svg.hashsalt": "phigen",
+    "svg.fonttype": "none",
+    "pdf.fonttype": 42,
+    "savefig.dpi": 200,
+    "figure.dpi": 100,
+    "figure.facecolor": PALETTE["paper"],
+    "axes.facecolor": "none",
+    "axes.edgecolor": PALETTE["muted"],
+    "axes.labelcolor": PALETTE["ink"],
+    "axes.titlecolor": PALETTE["ink"],
+    "axes.titlesize": 9.5,
+    "axes.labelsize": 9,
+    "axes.linewidth": 0.7,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.formatter.useoffset": False,
+    "axes.formatter.limits": (-3, 5),
+    "grid.color": PALETTE["grid"],
+    "grid.linewidth": 0.5,
+    "xtick.color": PALETTE["muted"],
+    "ytick.color": PALETTE["muted"],
+    "xtick.labelcolor": PALETTE["ink"],
+    "ytick.labelcolor": PALETTE["ink"],
+    "xtick.labelsize": 8,
+    "ytick.labelsize": 8,
+    "text.color": PALETTE["ink"],
+    "font.family": ["DejaVu Sans"],
+    "font.size": 9,
+    "legend.fontsize": 8.5,
+    "legend.frameon": False,
+    "lines.solid_capstyle": "round",
+    "lines.solid_joinstyle": "round",
+}
+
+
+@contextmanager
+def _styled() -> Iterator[None]:
+    """matplotlib with our settings instead of those of the user; raises `ToolchainError` if it is not installed."""
+    try:
+        import matplotlib as mpl
+    except ImportError:
+        hint = "it is the optional extra plot: pip install 'phigen[plot]'"
+        raise ToolchainError(f"figures need matplotlib, which is not installed\n  hint: {hint}") from None
+    with mpl.rc_context():
+        mpl.rcdefaults()
+        mpl.rcParams.update(_STYLE)
+        yield
+
+
+def styled(draw: Callable[P, T]) -> Callable[P, T]:
+    """Decorates functions that draw or write figures."""
+
+    @wraps(draw)
+    def drawn(*args: P.args, **kwargs: P.kwargs) -> T:
+        with _styled():
+            return draw(*args, **kwargs)
+
+    return drawn
+
+
+@styled
+def save(figure: Figure, path: str | Path) -> None:
+    """Write a figure to a file, PNG, SVG or PDF by its suffix; the bytes contain no date, name or random id."""
+    suffix = Path(path).suffix.lower()
+    if suffix not in SUFFIXES:
+        raise ValueError(f"cannot draw {str(path)!r}: the suffix must be one of {', '.join(SUFFIXES)}")
+    Path(path).write_bytes(_rendered(figure, suffix[1:]))
+
+
+@styled
+def svg(figure: Figure) -> str:
+    """A figure as the text of an SVG file, without a background."""
+    return _rendered(figure, "svg", transparent=True).decode("utf-8")
+
+
+def _rendered(figure: Figure, kind: str, transparent: bool = False) -> bytes:
+    nothing = {"png": {"Software": None}, "svg": {"Date": None, "Creator": None},
+               "pdf": {"CreationDate": None, "Creator": None, "Producer": None}}  # fmt: skip
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format=kind, metadata=nothing[kind], transparent=transparent)
+    return buffer.getvalue()

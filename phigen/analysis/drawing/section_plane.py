@@ -1,0 +1,54 @@
+"""Points of Poincaré sections."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from phigen.analysis.arrays import Floats
+from phigen.analysis.drawing.groups import groups
+from phigen.analysis.drawing.palette import SERIES
+
+#: A coordinate that varies less than this, relative to the largest, is that of the section itself.
+_CONSTANT = 1e-8
+
+
+def plane_of(names: Sequence[str], points: Floats) -> tuple[int, int]:
+    """The two columns (rows, names) to draw: a pair that belongs together, without the constant ones if possible."""
+    span = np.ptp(points, axis=0) if len(points) else np.ones(len(names))
+    constant = span <= _CONSTANT * max(float(span.max()), float(np.max(np.abs(points), initial=0.0)) * 1e-4)
+    varying = [name for name, fixed in zip(names, constant, strict=True) if not fixed]
+    pairs = [found for group in groups(names) if len(found := [n for n in group if n in varying]) >= 2]
+    chosen = (pairs[0] if pairs else [*varying, *(n for n in names if n not in varying)])[:2]
+    first, second = sorted(map(list(names).index, chosen))
+    return first, second
+
+
+def draw_section(axes: Any, sections: Mapping[str, Floats], names: Sequence[str]) -> None:
+    """Points (rows, names) of each section, a dot each."""
+    given = [points for points in sections.values() if len(points)]
+    i, j = plane_of(names, np.concatenate(given) if given else np.empty((0, len(names))))
+    for place, (label, points) in enumerate(sections.items()):
+        size = float(np.clip(4.0 - 1.1 * math.log10(max(len(points), 1) / 30), 0.8, 4.0))
+        axes.plot(
+            points[:, i], points[:, j], "o", markersize=size, markeredgewidth=0, color=SERIES[place % len(SERIES)],
+            label=label, rasterized=len(points) > 10_000, zorder=2,
+        )  # fmt: skip
+    axes.set(xlabel=names[i], ylabel=names[j])
+    axes.grid(True)
+    _widen(axes)
+    if len(sections) > 1:
+        axes.legend(loc="best", markerscale=2)
+
+
+def _widen(axes: Any) -> None:
+    """Points in one place, up to rounding, are shown as that, not as a cloud of rounding errors."""
+    for kind in "xy":
+        low, high = getattr(axes, f"get_{kind}lim")()
+        least = 1e-3 * max(abs(low), abs(high), 1e-9)
+        if high - low < least:
+            middle = (low + high) / 2
+            getattr(axes, f"set_{kind}lim")(middle - 50 * least, middle + 50 * least)

@@ -1,0 +1,87 @@
+"""Figures of runs: the trajectory, the errors of what should be conserved, Poincaré sections.
+
+Each function returns a `matplotlib.figure.Figure` and leaves matplotlib's global state as it was. The colours are those
+of `phigen.analysis.drawing.palette.PALETTE`; `save` and `svg` there write figures so that their bytes are a function of
+what they show. matplotlib is the optional extra ``plot``; without it every function here raises `ToolchainError`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+from phigen.analysis.arrays import Floats
+from phigen.analysis.drawing import error_curves, phase_space, section_plane
+from phigen.analysis.drawing.palette import PALETTE, SUFFIXES, save, styled, svg
+from phigen.runtime.trajectory import Trajectory
+from phigen.symbolic.expression import Expression
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["PALETTE", "SUFFIXES", "WIDTH", "error_figure", "run_figure", "save", "section_figure", "svg",
+           "trajectory_figure"]  # fmt: skip
+
+#: The widths of a page and of a single panel, in inches; PNG files have 200 dots per inch.
+WIDTH, NARROW = 7.2, 4.8
+_SECTION = 3.4
+
+
+@styled
+def trajectory_figure(trajectory: Trajectory, casimirs: Mapping[str, Expression]) -> Figure:
+    """The curve in phase space, in a plane, in space or in several projections, by the number of coordinates.
+
+    ``casimirs`` are the formulas of the Casimirs. In space the leaf is drawn: the surface on which the first Casimir
+    of these three coordinates is constant.
+    """
+    _, columns = phase_space.grid(trajectory.coordinates)
+    figure = _figure(phase_space.height(trajectory.coordinates), WIDTH if columns > 1 else NARROW)
+    phase_space.draw_trajectory(figure, trajectory, casimirs)
+    return figure
+
+
+@styled
+def error_figure(methods: Mapping[str, Trajectory]) -> Figure:
+    """The errors of energy and Casimirs against time, of several methods by their labels; one panel per quantity.
+
+    Errors are relative to the initial value unless that is negligible. Of long runs the largest error of each of some
+    hundred windows is drawn. Zeros have a place of their own, marked 0; a cross marks where a method broke down.
+    """
+    figure = _figure(error_curves.height(methods))
+    error_curves.draw_errors(figure, methods)
+    return figure
+
+
+@styled
+def section_figure(sections: Mapping[str, Floats], names: Sequence[str]) -> Figure:
+    """Points (rows, DIM) of Poincaré sections by their labels, in a plane of two of the coordinates ``names``."""
+    figure = _figure(_SECTION, NARROW)
+    section_plane.draw_section(figure.add_subplot(), sections, names)
+    return figure
+
+
+@styled
+def run_figure(
+    methods: Mapping[str, Trajectory],
+    casimirs: Mapping[str, Expression],
+    sections: Mapping[str, Floats] | None = None,
+    title: str = "",
+) -> Figure:
+    """All there is to see of a run on one page: the trajectory of the first method, the section, the errors of all."""
+    first = next(iter(methods.values()))
+    heights = [phase_space.height(first.coordinates), *[_SECTION] * bool(sections), error_curves.height(methods)]
+    figure = _figure(sum(heights))
+    if title:
+        figure.suptitle(title, fontsize=11)
+    parts = list(figure.subfigures(len(heights), 1, height_ratios=heights, squeeze=False)[:, 0])
+    phase_space.draw_trajectory(parts[0], first, casimirs)
+    if sections:
+        section_plane.draw_section(parts[1].add_subplot(), sections, first.coordinates)
+    error_curves.draw_errors(parts[-1], methods)
+    return figure
+
+
+def _figure(height: float, width: float = WIDTH) -> Figure:
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=(width, height), layout="constrained")
