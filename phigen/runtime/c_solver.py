@@ -2,7 +2,7 @@
 
 Beside the documented functions of the generated code, two small ones are used: ``size_t NAME_solver_size(void)``, and
 ``size_t NAME_solver_steps_done(const NAME_solver *)``, the good steps since ``NAME_init``. Of the solver's struct only
-the first member, ``double x[DIM]``, is looked at.
+the first member, ``double x[DIM]``, is looked at; it is copied and stored as the plain value it is.
 """
 
 from __future__ import annotations
@@ -13,9 +13,12 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from phigen.runtime import cache
-from phigen.runtime.interface import BackendError, Floats, Interface, MissingExtraError, Progress, row_steps
+from phigen.runtime.interface import BackendError, Floats, Interface, MissingExtraError
+
+Bytes = NDArray[np.uint8]
 
 #: Names of NAME_status, by value, without the prefix.
 STATUSES = ("OK", "NO_CONVERGENCE", "SINGULAR", "NOT_FINITE", "BAD_ARGUMENT")
@@ -23,7 +26,6 @@ STATUSES = ("OK", "NO_CONVERGENCE", "SINGULAR", "NOT_FINITE", "BAD_ARGUMENT")
 # Between two calls Python can deliver a keyboard interrupt.
 _STEPS_PER_CALL = 1 << 16
 _MEMBERS_PER_CALL = 1024  # a multiple of every vector width: members meet the same neighbours in each split
-_REPORTS = 200
 _ALIGNMENT = 64  # what the widest vector registers ask for
 
 _POINTER, _DOUBLE, _SIZE, _INT = ctypes.c_void_p, ctypes.c_double, ctypes.c_size_t, ctypes.c_int
@@ -44,6 +46,51 @@ _EXTRAS = {
     "step_tangent": (_INT, (_POINTER, _DOUBLE, _POINTER)),
     "init_gauge": (_INT, (_POINTER, _POINTER, _POINTER, _POINTER)),
 }
+
+
+class CSession:
+    """A struct NAME_solver; being a plain value, its bytes are all there is to know. See `Session`."""
+
+    def __init__(self, functions: Any, struct: Bytes, dimension: int) -> None:
+        self._c, self._struct = functions, struct
+        self.address = ctypes.c_void_p(struct.ctypes.data)
+        self._x = struct[: 8 * dimension].view(np.float64)
+
+    @property
+    def steps(self) -> int:
+        """See `Session`."""
+        return int(self._c.solver_steps_done(self.address))
+
+    def state(self) -> Floats:
+        """See `Session`."""
+        return self._x.copy()
+
+    def advance(self, h: float, steps: int) -> None:
+        """See `Session`."""
+        while steps > 0:
+            chunk = min(steps, _STEPS_PER_CALL)
+            status = self._c.integrate(self.address, h, chunk)
+            if status:
+                raise BackendError(_status(status), self.steps, self._x.reshape(1, -1).copy())
+            steps -= chunk
+
+    def advance_tangent(self, h: float) -> Floats:
+        """See `Session`."""
+        if not hasattr(self._c, "step_tangent"):
+            raise MissingExtraError("step_tangent")
+        tangent = np.empty((len(self._x), len(self._x)))
+        status = self._c.step_tangent(self.address, h, tangent.ctypes.data)
+        if status:
+            raise BackendError(_status(status), self.steps, self._x.reshape(1, -1).copy())
+        return tangent
+
+    def branch(self) -> CSession:
+        """See `Session`."""
+        return CSession(self._c, _aligned_copy(self._struct), len(self._x))
+
+    def saved(self) -> bytes:
+        """See `Session`."""
+        return self._struct.tobytes()
 
 
 class CSolver:
@@ -70,29 +117,29 @@ class CSolver:
         """Compile generated files (name → text), or take them from the cache; raises `ToolchainError`."""
         return cls(cache.load(files), interface)
 
-    def integrate(
-        self, x0: Floats, h: float, steps: int, stride: int, parameters: Mapping[str, float], progress: Progress | None
-    ) -> Floats:
+    @property
+    def identity(self) -> str:
         """See `phigen.runtime.interface.Backend`."""
-        marks = row_steps(steps, stride)
-        states = np.empty((len(marks), self.interface.dimension))
-        states[0] = x0
-        solver, x = self._initialised(x0, parameters)
-        report_every = max(1, steps // _REPORTS)
-        done = reported = 0
-        for row, mark in enumerate(marks.tolist()[1:], start=1):
-            while done < mark:
-                chunk = min(mark - done, _STEPS_PER_CALL)
-                status = self._c.integrate(solver, h, chunk)
-                if status:
-                    good = self._c.solver_steps_done(solver)
-                    raise BackendError(_status(status), good, _rows_so_far(states, marks, good, x))
-                done += chunk
-                if progress and (done - reported >= report_every or done == steps):
-                    reported = done
-                    progress(done)
-            states[row] = x
-        return states
+        return cache.key_of(self._library)
+
+    def start(self, x0: Floats, parameters: Mapping[str, float]) -> CSession:
+        """See `phigen.runtime.interface.Backend`."""
+        session = CSession(self._c, _aligned(self._c.solver_size()), self.interface.dimension)
+        packed, first = self._packed(parameters), np.ascontiguousarray(x0, dtype=np.float64)
+        if self._gauge is None:
+            status = self._c.init(session.address, packed.ctypes.data, first.ctypes.data)
+        else:
+            gauge = self._gauge.ctypes.data
+            status = self._c.init_gauge(session.address, packed.ctypes.data, first.ctypes.data, gauge)
+        if status:
+            raise BackendError(_status(status), 0, first.reshape(1, -1))
+        return session
+
+    def restored(self, saved: bytes, parameters: Mapping[str, float]) -> CSession:
+        """See `phigen.runtime.interface.Backend`; the parameters are part of the bytes."""
+        if len(saved) != self._c.solver_size():
+            raise ValueError(f"{len(saved)} bytes are no {self.interface.name}_solver of this library")
+        return CSession(self._c, _aligned_copy(np.frombuffer(saved, dtype=np.uint8)), self.interface.dimension)
 
     def ensemble(self, x0: Floats, h: float, steps: int, parameters: Mapping[str, float]) -> Floats:
         """See `phigen.runtime.interface.Backend`."""
@@ -114,17 +161,6 @@ class CSolver:
             raise BackendError(_status(first), -1, final, failed)
         return final
 
-    def step_tangent(self, x: Floats, h: float, parameters: Mapping[str, float]) -> tuple[Floats, Floats]:
-        """See `phigen.runtime.interface.Backend`."""
-        if not hasattr(self._c, "step_tangent"):
-            raise MissingExtraError("step_tangent")
-        solver, state = self._initialised(x, parameters)
-        tangent = np.empty((len(x), len(x)))
-        status = self._c.step_tangent(solver, h, tangent.ctypes.data)
-        if status:
-            raise BackendError(_status(status), 0, x.reshape(1, -1))
-        return state.copy(), tangent
-
     def hamiltonian(self, x: Floats, parameters: Mapping[str, float]) -> Floats:
         """See `phigen.runtime.interface.Backend`."""
         packed, x = self._packed(parameters), np.ascontiguousarray(x)
@@ -145,24 +181,6 @@ class CSolver:
             function(packed.ctypes.data, source, target)
         return out
 
-    def _initialised(self, x0: Floats, parameters: Mapping[str, float]) -> tuple[ctypes.c_void_p, Floats]:
-        """A solver at x0, and a view of its state."""
-        size = self._c.solver_size()
-        memory = np.zeros(size + _ALIGNMENT, dtype=np.uint8)
-        start = -memory.ctypes.data % _ALIGNMENT
-        struct = memory[start : start + size]
-        packed, first = self._packed(parameters), np.ascontiguousarray(x0, dtype=np.float64)
-        address = ctypes.c_void_p(struct.ctypes.data)
-        x = struct[: 8 * self.interface.dimension].view(np.float64)  # keeps the memory alive
-        if self._gauge is None:
-            status = self._c.init(address, packed.ctypes.data, first.ctypes.data)
-        else:
-            gauge = self._gauge.ctypes.data
-            status = self._c.init_gauge(address, packed.ctypes.data, first.ctypes.data, gauge)
-        if status:
-            raise BackendError(_status(status), 0, first.reshape(1, -1))
-        return address, x
-
     def _packed(self, parameters: Mapping[str, float]) -> Floats:
         # A struct without parameters has one unused char, which the zero covers.
         return np.array(list(parameters.values()) or [0.0], dtype=np.float64)
@@ -174,9 +192,16 @@ def _addresses(x: Floats) -> range:
     return range(start, start + len(x) * width, width)
 
 
-def _rows_so_far(states: Floats, marks: np.ndarray[tuple[int], np.dtype[np.int64]], good: int, x: Floats) -> Floats:
-    rows = states[marks <= good]
-    return rows.copy() if good in marks else np.vstack([rows, x])
+def _aligned(size: int) -> Bytes:
+    memory = np.zeros(size + _ALIGNMENT, dtype=np.uint8)
+    start = -memory.ctypes.data % _ALIGNMENT
+    return memory[start : start + size]
+
+
+def _aligned_copy(struct: Bytes) -> Bytes:
+    copy = _aligned(len(struct))
+    copy[:] = struct
+    return copy
 
 
 def _status(value: int) -> str:

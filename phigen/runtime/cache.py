@@ -96,6 +96,11 @@ def build(files: Mapping[str, str], folder: Path | None = None) -> Path:
         return _compile_into(fallback, name, files, compiler)
 
 
+def key_of(library: ctypes.CDLL) -> str:
+    """The hash of everything that decided a library from `load`."""
+    return Path(library._name).stem.rpartition("-")[0]
+
+
 def clear() -> int:
     """Remove all entries; returns how many there were. Libraries that are loaded stay usable."""
     count = 0

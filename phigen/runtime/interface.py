@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from phigen.runtime.session import Session
 
 Floats = NDArray[np.float64]
 
@@ -57,22 +60,25 @@ class Backend(Protocol):
 
     target: str
 
+    @property
+    def identity(self) -> str:
+        """A hash of all that decides the results, and what bytes of a session mean."""
+        ...
+
+    def start(self, x0: Floats, parameters: Mapping[str, float]) -> Session:
+        """A session at x0 (DIM,)."""
+        ...
+
+    def restored(self, saved: bytes, parameters: Mapping[str, float]) -> Session:
+        """The session whose `Session.saved` bytes these are, made by a back end of the same `identity`."""
+        ...
+
     def with_gauge(self, gauge: Floats) -> Backend:
         """A back end whose trajectories all have the given gauge, one value for each Casimir of the gauge."""
         ...
 
-    def integrate(
-        self, x0: Floats, h: float, steps: int, stride: int, parameters: Mapping[str, float], progress: Progress | None
-    ) -> Floats:
-        """States (rows, DIM) after 0, stride, 2·stride, … steps, and the final one."""
-        ...
-
     def ensemble(self, x0: Floats, h: float, steps: int, parameters: Mapping[str, float]) -> Floats:
         """Final states (members, DIM) of initial states (members, DIM)."""
-        ...
-
-    def step_tangent(self, x: Floats, h: float, parameters: Mapping[str, float]) -> tuple[Floats, Floats]:
-        """The state (DIM,) after one step from ``x`` (DIM,), and its derivative (DIM, DIM)."""
         ...
 
     def hamiltonian(self, x: Floats, parameters: Mapping[str, float]) -> Floats:

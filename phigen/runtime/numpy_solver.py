@@ -1,8 +1,13 @@
-"""A generated NumPy module, loaded from its source text."""
+"""A generated NumPy module, loaded from its source text.
+
+Beside the documented functions, sessions use the parts of ``integrate``: ``_coefficients``, ``_advance`` and, with
+tangents, ``_tangent_stage``.
+"""
 
 from __future__ import annotations
 
 import hashlib
+import io
 import linecache
 from collections.abc import Mapping
 from types import ModuleType
@@ -10,9 +15,9 @@ from typing import Any
 
 import numpy as np
 
-from phigen.runtime.interface import BackendError, Floats, Interface, MissingExtraError, Progress, row_steps
+from phigen.runtime.interface import BackendError, Floats, Interface, MissingExtraError
 
-_REPORTS = 100
+Pair = tuple[Floats, Floats]
 
 
 def load_module(source: str, name: str) -> ModuleType:
@@ -24,6 +29,96 @@ def load_module(source: str, name: str) -> ModuleType:
     module.__file__ = filename
     exec(compile(source, filename, "exec"), module.__dict__)  # text that phigen itself generated
     return module
+
+
+class NumpySession:
+    """What the loop of the module's ``integrate`` holds. See `phigen.runtime.session.Session`."""
+
+    def __init__(
+        self, module: Any, parameters: Mapping[str, float], x: Floats, carry: Floats, gauge: Floats | None
+    ) -> None:
+        self.steps = 0
+        self._module, self._parameters, self._gauge = module, parameters, gauge
+        self._x, self._carry = x, carry
+        self._h = np.nan
+        self._coef: list[Floats] = []
+        self._memory: list[Pair] = []
+
+    def state(self) -> Floats:
+        """See `Session`."""
+        return np.array(self._x[0])
+
+    def advance(self, h: float, steps: int) -> None:
+        """See `Session`."""
+        self._prepare(h)
+        with np.errstate(all="ignore"):
+            for _ in range(steps):
+                self._commit(*self._tried()[:3])
+
+    def advance_tangent(self, h: float) -> Floats:
+        """See `Session`."""
+        if not hasattr(self._module, "_tangent_stage"):
+            raise MissingExtraError("step_tangent")
+        self._prepare(h)
+        tangent = np.eye(self._x.shape[1])
+        with np.errstate(all="ignore"):
+            x, carry, memory, stages = self._tried()
+            for arguments in stages:
+                stage, found = self._module._tangent_stage(*arguments)
+                if not (found.all() and np.isfinite(stage).all()):
+                    raise BackendError("NO_CONVERGENCE", self.steps, self._x.copy())
+                tangent = stage[0] @ tangent
+        self._commit(x, carry, memory)
+        return tangent
+
+    def branch(self) -> NumpySession:
+        """See `Session`."""
+        twin = NumpySession(self._module, self._parameters, self._x, self._carry, self._gauge)
+        twin.steps, twin._h, twin._coef, twin._memory = self.steps, self._h, self._coef, list(self._memory)
+        return twin
+
+    def saved(self) -> bytes:
+        """See `Session`."""
+        buffer = io.BytesIO()
+        gauge = np.empty(0) if self._gauge is None else self._gauge
+        memory = np.array(self._memory)
+        np.savez(buffer, x=self._x, carry=self._carry, memory=memory, gauge=gauge, h=self._h, steps=self.steps)
+        return buffer.getvalue()
+
+    @classmethod
+    def from_bytes(cls, module: Any, parameters: Mapping[str, float], saved: bytes) -> NumpySession:
+        """The session whose `saved` bytes these are."""
+        with np.load(io.BytesIO(saved)) as stored:
+            gauge = stored["gauge"] if stored["gauge"].size else None
+            session = cls(module, parameters, stored["x"], stored["carry"], gauge)
+            session.steps = int(stored["steps"])
+            if np.isfinite(stored["h"]):
+                session._prepare(float(stored["h"]))
+                session._memory = [(pair[0], pair[1]) for pair in stored["memory"]]
+        return session
+
+    def _prepare(self, h: float) -> None:
+        if h != self._h:
+            values = self._module._values(dict(self._parameters))
+            with np.errstate(all="ignore"):
+                self._coef = self._module._coefficients(values, self._x, h, self._gauge)
+            self._memory = [(np.zeros_like(self._x),) * 2] * len(self._coef)
+            self._h = h
+
+    def _tried(self) -> tuple[Floats, Floats, list[Pair], list[tuple[Floats, Floats, Floats, Floats]]]:
+        """State, carry and memory after one step, and of each stage: coefficients, start and what it solved for."""
+        x, carry, memory, stages = self._x, self._carry, list(self._memory), []
+        for k, coef in enumerate(self._coef):
+            before = coef, x, carry
+            x, carry, memory[k], status = self._module._advance(coef, x, carry, memory[k])
+            if status[0] != "":
+                raise BackendError(str(status[0]), self.steps, self._x.copy())
+            stages.append((*before, memory[k][0]))
+        return x, carry, memory, stages
+
+    def _commit(self, x: Floats, carry: Floats, memory: list[Pair]) -> None:
+        self._x, self._carry, self._memory = x, carry, memory
+        self.steps += 1
 
 
 class NumpySolver:
@@ -45,25 +140,22 @@ class NumpySolver:
         """Load the text of a generated module."""
         return cls(load_module(source, interface.name), interface)
 
-    def integrate(
-        self, x0: Floats, h: float, steps: int, stride: int, parameters: Mapping[str, float], progress: Progress | None
-    ) -> Floats:
+    @property
+    def identity(self) -> str:
         """See `phigen.runtime.interface.Backend`."""
-        if progress is None:
-            return self._rows(x0, h, steps, stride, parameters)
-        # A chunk is a multiple of the stride, so that its rows fall on those of the whole.
-        chunk = stride * max(1, -(-steps // (stride * _REPORTS)))
-        parts = [x0[np.newaxis]]
-        for done in range(0, steps, chunk):
-            count = min(chunk, steps - done)
-            try:
-                rows = self._rows(parts[-1][-1], h, count, stride, parameters)
-            except BackendError as error:
-                states = np.concatenate([*parts, error.states[1:]])
-                raise BackendError(error.status, done + error.step, states) from error
-            parts.append(rows[1:])
-            progress(done + count)
-        return np.concatenate(parts)
+        return str(self.module.__file__)
+
+    def start(self, x0: Floats, parameters: Mapping[str, float]) -> NumpySession:
+        """See `phigen.runtime.interface.Backend`."""
+        x = x0[np.newaxis].copy()
+        gauge = self._options.get("gauge")
+        if gauge is None and self.module.GAUGE:
+            gauge = self.module.gauge(x0, **parameters)
+        return NumpySession(self.module, parameters, x, np.zeros_like(x), gauge)
+
+    def restored(self, saved: bytes, parameters: Mapping[str, float]) -> NumpySession:
+        """See `phigen.runtime.interface.Backend`."""
+        return NumpySession.from_bytes(self.module, parameters, saved)
 
     def ensemble(self, x0: Floats, h: float, steps: int, parameters: Mapping[str, float]) -> Floats:
         """See `phigen.runtime.interface.Backend`."""
@@ -77,16 +169,6 @@ class NumpySolver:
             raise BackendError(str(error.status), int(error.step), states[-1], members) from error
         return np.asarray(rows[-1], dtype=np.float64)
 
-    def step_tangent(self, x: Floats, h: float, parameters: Mapping[str, float]) -> tuple[Floats, Floats]:
-        """See `phigen.runtime.interface.Backend`."""
-        if not hasattr(self.module, "step_tangent"):
-            raise MissingExtraError("step_tangent")
-        try:
-            following, tangent = self.module.step_tangent(x, h, **self._options, **parameters)
-        except self.module.StepError as error:
-            raise BackendError(str(error.status), 0, x[np.newaxis]) from error
-        return np.asarray(following, dtype=np.float64), np.asarray(tangent, dtype=np.float64)
-
     def hamiltonian(self, x: Floats, parameters: Mapping[str, float]) -> Floats:
         """See `phigen.runtime.interface.Backend`."""
         return np.asarray(self.module.hamiltonian(x, **parameters), dtype=np.float64)
@@ -98,20 +180,3 @@ class NumpySolver:
     def vector_field(self, x: Floats, parameters: Mapping[str, float]) -> Floats:
         """See `phigen.runtime.interface.Backend`."""
         return np.asarray(self.module.vector_field(x, **parameters), dtype=np.float64)
-
-    def _rows(self, x0: Floats, h: float, steps: int, stride: int, parameters: Mapping[str, float]) -> Floats:
-        if steps == 0:
-            return x0[np.newaxis].copy()
-        try:
-            rows = self.module.integrate(x0, h, steps, stride=stride, **self._options, **parameters)
-        except self.module.StepError as error:
-            states = np.asarray(error.states, dtype=np.float64).reshape(-1, self.interface.dimension)
-            raise BackendError(
-                str(error.status), int(error.step), _ending_at(states, int(error.step), stride)
-            ) from error
-        return np.asarray(rows, dtype=np.float64)
-
-
-def _ending_at(states: Floats, good: int, stride: int) -> Floats:
-    """The rows a trajectory of ``good`` steps has, as far as they are there."""
-    return states[: len(row_steps(good, stride))]

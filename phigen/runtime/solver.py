@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from phigen.errors import StepError
 from phigen.runtime.interface import Backend, BackendError, Floats, Interface, MissingExtraError, Progress, row_steps
+from phigen.runtime.session import rows_along
 from phigen.runtime.trajectory import Trajectory
 
 _ADVICE = {
@@ -72,11 +73,9 @@ class Solver:
         start, h = self._state(x0, "x0"), _step_size(h)
         steps, stride = _count(steps, "steps", 0), _count(stride, "stride", 1)
         try:
-            states = self.backend.integrate(start, h, steps, stride, values, progress)
+            states = rows_along(self.backend.start(start, values), h, steps, stride, progress)
         except BackendError as error:
-            # A back end may know of fewer rows than its last good step allows: then the trajectory ends earlier.
-            stored = row_steps(error.step, stride)[: len(error.states)]
-            trajectory = self._trajectory(error.states, stored, h, values)
+            trajectory = self._trajectory(error.states, row_steps(error.step, stride), h, values)
             raise self._failure(error, h, trajectory) from error
         return self._trajectory(states, row_steps(steps, stride), h, values)
 
@@ -85,10 +84,11 @@ class Solver:
         values = self._parameters(parameters, more)
         start, h = self._state(x, "x"), _step_size(h)
         try:
-            states = self.backend.integrate(start, h, 1, 1, values, None)
+            session = self.backend.start(start, values)
+            session.advance(h, 1)
         except BackendError as error:
             raise self._failure(error, h, None) from error
-        return np.array(states[-1])
+        return session.state()
 
     def step_tangent(
         self, x: ArrayLike, h: float, *, parameters: Mapping[str, float] | None = None, **more: float
@@ -101,12 +101,14 @@ class Solver:
         values = self._parameters(parameters, more)
         start, h = self._state(x, "x"), _step_size(h)
         try:
-            return self.backend.step_tangent(start, h, values)
+            session = self.backend.start(start, values)
+            tangent = session.advance_tangent(h)
         except MissingExtraError:
             hint = "compile it with tangent=True, or say tangent: true in the spec"
             raise TypeError(f"{self.interface.name} was compiled without step_tangent; {hint}") from None
         except BackendError as error:
             raise self._failure(error, h, None) from error
+        return session.state(), tangent
 
     def ensemble(
         self, X0: ArrayLike, h: float, steps: int, *, parameters: Mapping[str, float] | None = None, **more: float

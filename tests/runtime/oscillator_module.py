@@ -14,36 +14,43 @@ class StepError(Exception):
         self.step, self.status, self.members, self.states = step, status, members, states
 
 
-def _advance(x, h, omega):
-    c, d = np.cos(omega * h), np.sin(omega * h)
+FRACTIONS = (1.0,)
+GAUGE = ()
+
+
+def _values(parameters):
+    return {**DEFAULT_PARAMETERS, **parameters}
+
+
+def _coefficients(parameters, x, h, gauge):
+    omega = parameters["omega"]
+    return [np.array([np.cos(omega * h), np.sin(omega * h), omega, parameters["limit"]])]
+
+
+def _advance(coef, x, carry, memory):
+    c, d, omega, limit = coef
     q, p = c * x[..., 0] + d / omega * x[..., 1], c * x[..., 1] - d * omega * x[..., 0]
-    return np.stack([q, p, x[..., 2]], axis=-1)
-
-
-def step(x, h, **parameters):
-    return integrate(x, h, 1, **parameters)[-1]
+    status = np.where(np.abs(q) > limit, "NO_CONVERGENCE", "")
+    return np.stack([q, p, x[..., 2]], axis=-1), carry, memory, status
 
 
 def integrate(x0, h, steps, stride=1, **parameters):
-    values = {**DEFAULT_PARAMETERS, **parameters}
     x = np.array(x0, dtype=float)
+    shape, x = x.shape, x.reshape(-1, DIM)
+    coef = _coefficients(_values(parameters), x, h, None)[0]
     rows = [x]
     for done in range(1, steps + 1):
-        following = _advance(x, h, values["omega"])
-        wrong = np.abs(following[..., 0]) > values["limit"]
-        if wrong.any():
-            states = rows if (done - 1) % stride == 0 else [*rows, x]
-            raise StepError(
-                done - 1, "NO_CONVERGENCE", tuple(np.flatnonzero(wrong)) if x.ndim > 1 else (), np.array(states)
-            )
+        following, _, _, status = _advance(coef, x, 0 * x, None)
+        if (failed := np.flatnonzero(status != "")).size:
+            raise StepError(done - 1, "NO_CONVERGENCE", tuple(failed), np.array([*rows, x]).reshape((-1, *shape)))
         x = following
         if done % stride == 0 or done == steps:
             rows.append(x)
-    return np.array(rows)
+    return np.array(rows).reshape((-1, *shape))
 
 
 def hamiltonian(x, **parameters):
-    values = {**DEFAULT_PARAMETERS, **parameters}
+    values = _values(parameters)
     return (x[..., 1] ** 2 + values["omega"] ** 2 * x[..., 0] ** 2) / 2
 
 
@@ -52,5 +59,5 @@ def casimirs(x, **parameters):
 
 
 def vector_field(x, **parameters):
-    omega = {**DEFAULT_PARAMETERS, **parameters}["omega"]
+    omega = _values(parameters)["omega"]
     return np.stack([x[..., 1], -(omega**2) * x[..., 0], 0 * x[..., 2]], axis=-1)

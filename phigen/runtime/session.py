@@ -1,0 +1,71 @@
+"""A solver on its way along one trajectory, step by step."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+
+from phigen.runtime.interface import BackendError, Floats, Progress, row_steps
+
+#: How often `rows_along` tells about its progress, at most.
+_REPORTS = 200
+
+
+class Session(Protocol):
+    """A trajectory being computed: its state, and all that the next step depends on.
+
+    Steps are those of one integration, to the last bit, however they are split into calls. A failing step raises
+    `BackendError` and leaves the state before it.
+    """
+
+    @property
+    def steps(self) -> int:
+        """Good steps since the start."""
+        ...
+
+    def state(self) -> Floats:
+        """A copy of the state (DIM,)."""
+        ...
+
+    def advance(self, h: float, steps: int) -> None:
+        """Make so many steps."""
+        ...
+
+    def advance_tangent(self, h: float) -> Floats:
+        """Make one step; its derivative (DIM, DIM). Raises `MissingExtraError` without the extra ``tangent``."""
+        ...
+
+    def branch(self) -> Session:
+        """An independent copy."""
+        ...
+
+    def saved(self) -> bytes:
+        """All there is to know, for `Backend.restored`."""
+        ...
+
+
+def rows_along(session: Session, h: float, steps: int, stride: int, progress: Progress | None) -> Floats:
+    """States (rows, DIM) after 0, stride, 2·stride, … steps and the last, of a session that stands at its start.
+
+    Raises `BackendError`, whose rows end with the last good state.
+    """
+    marks = row_steps(steps, stride)
+    start = session.state()
+    states = np.empty((len(marks), len(start)))
+    states[0] = start
+    report_every, reported = max(1, steps // _REPORTS), 0
+    for row, mark in enumerate(marks.tolist()[1:], start=1):
+        try:
+            session.advance(h, mark - session.steps)
+        except BackendError as error:
+            good = session.steps
+            kept = states[: len(row_steps(good, stride))].copy()
+            # The last row of a trajectory is its last state, whether or not a stride ends there.
+            kept[-1] = session.state()
+            raise BackendError(error.status, good, kept) from error
+        states[row] = session.state()
+        if progress and (mark - reported >= report_every or mark == steps):
+            reported = mark
+            progress(mark)
+    return states
