@@ -91,16 +91,15 @@ def of_polynomial(tower: Tower, element: Poly, most: int | None = SHOWN) -> Form
 def readable(expressions: Sequence[Expression], most: int | None = SHOWN) -> list[str]:
     """The expressions as text, expanded where that is shorter; covectors are written ``p_NAME``."""
     shown = with_plain_names(expressions)
-    expanded = _expanded(shown, most)
+    forms = expanded(shown, most)
     plain = [_infix(e) if len(topological([e])) <= _LARGE else text(e) for e in shown]
-    return [min((str(f), t), key=len) if f else t for f, t in zip(expanded, plain, strict=True)]
+    return [min((str(f), t), key=len) if f else t for f, t in zip(forms, plain, strict=True)]
 
 
 def readable_latex(expressions: Sequence[Expression]) -> list[str]:
     """The expressions in LaTeX, expanded where that is shorter."""
     shown = with_plain_names(expressions)
-    expanded = _expanded(shown, None)
-    forms = [[latex(e), *([f.latex()] if f else [])] for f, e in zip(expanded, shown, strict=True)]
+    forms = [[latex(e), *([f.latex()] if f else [])] for f, e in zip(expanded(shown, None), shown, strict=True)]
     return [min(form, key=len) for form in forms]
 
 
@@ -153,7 +152,8 @@ def with_plain_names(expressions: Sequence[Expression]) -> list[Expression]:
     return substitute(expressions, {n: symbol(n.rstrip(":").replace("gauge:", "λ_").replace(":", "_")) for n in names})
 
 
-def _expanded(expressions: Sequence[Expression], most: int | None) -> Iterator[Formula | None]:
+def expanded(expressions: Sequence[Expression], most: int | None) -> Iterator[Formula | None]:
+    """The expressions multiplied out, with ``most`` terms shown; None for those that are too large to try."""
     for e in expressions:
         if len(topological([e])) > _LARGE:
             yield None

@@ -1,0 +1,342 @@
+"""Formulas as MathML Core, which browsers show without any script or font of ours.
+
+An expression becomes a sum of terms, a term a coefficient and factors above and below a fraction line: so
+associativity, signs and quotients look as on paper, whatever the tree. Markup is always exactly one element, unless
+it says otherwise, and all text in it is escaped.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from html import escape
+from itertools import pairwise
+from typing import Any
+
+from phigen.analysis.formulas import Formula
+from phigen.symbolic.expression import Expression, fold, natural_key
+
+#: Characters of markup beyond which a part of a formula is left out; what is shared should have a name by then.
+LONGEST = 60_000
+
+#: An exponent longer than this makes exp(…) of a power of e.
+_LONG_EXPONENT = 250
+
+_GREEK = {
+    "alpha": "α", "beta": "β", "gamma": "γ", "delta": "δ", "epsilon": "ε", "zeta": "ζ", "eta": "η", "theta": "θ",
+    "iota": "ι", "kappa": "κ", "lambda": "λ", "mu": "μ", "nu": "ν", "xi": "ξ", "rho": "ρ", "sigma": "σ", "tau": "τ",
+    "upsilon": "υ", "phi": "φ", "chi": "χ", "psi": "ψ", "omega": "ω", "Gamma": "Γ", "Delta": "Δ", "Theta": "Θ",
+    "Lambda": "Λ", "Xi": "Ξ", "Pi": "Π", "Sigma": "Σ", "Phi": "Φ", "Psi": "Ψ", "Omega": "Ω",
+}  # fmt: skip
+_FUNCTIONS = {
+    "asin": "arcsin", "acos": "arccos", "atan": "arctan", "asinh": "arsinh", "acosh": "arcosh", "atanh": "artanh",
+    "sign": "sgn", "phi0": "φ", "phi1": "φ′", "phi2": "φ″",
+}  # fmt: skip
+#: Symbols of phigen's own, ``p:x1`` and the like: the letter before the index.
+_OWN = {"gauge": "λ", "part": "σ"}
+
+_TIMES, _APPLY = "<mo>&#x2062;</mo>", "<mo>&#x2061;</mo>"  # both invisible
+_DOT, _DOTS = "<mo>·</mo>", "<mo>…</mo>"
+
+
+@dataclass(frozen=True)
+class Factor:
+    """``base`` carries ``index`` and exponents; ``tail`` follows, as the argument of a function does.
+
+    ``terms`` are those of a sum in parentheses. ``word`` tells a name of several letters, to be set apart;
+    ``raised`` a power, which takes no further exponent as it stands; ``key`` sorts names and their powers.
+    """
+
+    base: str
+    index: str = ""
+    tail: str = ""
+    terms: tuple[Term, ...] = ()
+    word: bool = False
+    raised: bool = False
+    key: tuple[Any, ...] = ()
+
+    @property
+    def markup(self) -> str:
+        """The factor among others."""
+        base = f"<msub>{self.base}{self.index}</msub>" if self.index else self.base
+        return _row(base + self.tail) if self.tail else base
+
+    @property
+    def alone(self) -> str:
+        """The factor where nothing stands beside it: a sum loses its parentheses."""
+        return summed(self.terms) if self.terms else self.markup
+
+    def power(self, exponent: str) -> Factor:
+        """The factor with an exponent."""
+        if self.raised:
+            return Factor(_parentheses(self.markup)).power(exponent)
+        kind, index = ("msubsup", self.index) if self.index else ("msup", "")
+        return Factor(f"<{kind}>{self.base}{index}{exponent}</{kind}>", tail=self.tail, raised=True, key=self.key)
+
+
+@dataclass(frozen=True)
+class Term:
+    """coefficient · above / below."""
+
+    coefficient: Fraction
+    above: tuple[Factor, ...] = ()
+    below: tuple[Factor, ...] = ()
+
+    @property
+    def magnitude(self) -> str:
+        """The markup without the sign."""
+        c = abs(self.coefficient)
+        top, bottom = (c, Fraction(1)) if _is_decimal(c) else (Fraction(c.numerator), Fraction(c.denominator))
+        above = _product(top, self.above)
+        return f"<mfrac>{above}{_product(bottom, self.below)}</mfrac>" if self.below or bottom != 1 else above
+
+
+Sum = tuple[Term, ...]
+
+
+def terms_of(e: Expression) -> Sum:
+    """The expression as a sum of terms; empty if it is 0."""
+    return fold([e], _visit)[0]
+
+
+def terms_of_formula(formula: Formula) -> Sum:
+    """The terms of a formula, its divisor left out."""
+    found: list[Term] = []
+    for c, monomial in formula.terms:
+        found += _times((Term(c),), *(_power(terms_of(base), exponent) for base, exponent in monomial))
+    return (*found, *_one(Factor(_DOTS))) if formula.hidden else tuple(found)
+
+
+def expression(e: Expression) -> str:
+    """An expression."""
+    return summed(terms_of(e))
+
+
+def summed(terms: Sequence[Term]) -> str:
+    """A sum."""
+    if not terms:
+        return number(Fraction(0))
+    first, *rest = terms
+    if not rest and first.coefficient > 0:
+        return first.magnitude
+    signed = "".join(f"<mo>{_sign(t)}</mo>{t.magnitude}" for t in rest)
+    return _row(("<mo>−</mo>" if first.coefficient < 0 else "") + first.magnitude + signed)
+
+
+def pieces(e: Expression | Formula) -> list[str]:
+    """A formula in pieces between which a line may break: one for each term of its outermost sum.
+
+    Each is the content of an element ``<math>`` of its own; set one after the other, they are the formula.
+    """
+    if isinstance(e, Expression):
+        return _pieces(terms_of(e))
+    terms = terms_of_formula(e)
+    return _pieces(terms if e.divisor == 1 else _times((Term(Fraction(1, e.divisor)),), terms))
+
+
+def math(markup: str) -> str:
+    """The element that shows markup as a formula."""
+    return f'<math displaystyle="true">{markup}</math>'
+
+
+def name(identifier: str) -> str:
+    """A name: ``omega_1`` as ω with index 1, ``x12`` as x with index 12, ``p:x1`` as p with index x_1."""
+    return _name(identifier).markup
+
+
+def number(value: Fraction) -> str:
+    """A number ≥ 0; a decimal of many digits stays one."""
+    if value.denominator == 1:
+        return f"<mn>{value.numerator}</mn>"
+    if not _is_decimal(value):
+        return f"<mfrac><mn>{value.numerator}</mn><mn>{value.denominator}</mn></mfrac>"
+    digits = next(k for k in range(1, 1000) if (value * 10**k).denominator == 1)
+    written = str(int(value * 10**digits)).rjust(digits + 1, "0")
+    return f"<mn>{written[:-digits]}.{written[-digits:]}</mn>"
+
+
+def matrix(rows: Sequence[Sequence[Expression]]) -> str:
+    """A matrix in parentheses."""
+    body = "".join("<mtr>" + "".join(f"<mtd>{expression(e)}</mtd>" for e in row) + "</mtr>" for row in rows)
+    return _parentheses(f"<mtable>{body}</mtable>")
+
+
+def indexed(letter: str, index: str) -> str:
+    """A letter with a name as its index: α_{x_1}."""
+    return f"<msub><mi>{escape(letter)}</mi>{name(index)}</msub>"
+
+
+def bracket(a: str, b: str) -> str:
+    """The Poisson bracket of two coordinates, {a, b}."""
+    return _row(f'<mo stretchy="false">{{</mo>{name(a)}<mo>,</mo>{name(b)}<mo stretchy="false">}}</mo>')
+
+
+def _visit(node: Expression, args: list[Sum]) -> Sum:
+    match node.op:
+        case "number":
+            return (Term(node.value),) if node.value else ()
+        case "symbol":
+            return _one(_name(node.value))
+        case "pi" | "E":
+            return _one(Factor("<mi>π</mi>" if node.op == "pi" else "<mi>e</mi>"))
+        case "add":
+            return _sorted(args[0] + args[1])
+        case "sub":
+            return _sorted(args[0] + _negated(args[1]))
+        case "neg":
+            return _negated(args[0])
+        case "mul":
+            return _times(*args)
+        case "pow":
+            return _power(args[0], node.value)
+        case "power":
+            return _one(_base(args[0]).power(summed(args[1])))
+        case "exp" if len(summed(args[0])) <= _LONG_EXPONENT:
+            return _one(Factor("<mi>e</mi>").power(summed(args[0])))
+        case "expm1":
+            return (*_called("exp", args), Term(Fraction(-1)))
+        case "abs":
+            return _one(Factor(_row(f"<mo>|</mo>{summed(args[0])}<mo>|</mo>")))
+    return _called(node.op, args)
+
+
+def _called(function: str, args: Sequence[Sum]) -> Sum:
+    arguments = _parentheses("<mo>,</mo>".join(summed(a) for a in args))
+    return _one(Factor(f"<mi>{escape(_FUNCTIONS.get(function, function))}</mi>", tail=_APPLY + arguments))
+
+
+def _power(base: Sum, exponent: Fraction) -> Sum:
+    if exponent < 0:
+        below = _single(_power(base, -exponent))
+        if below.coefficient == 0:  # as somebody wrote it
+            return _one(Factor("<mfrac><mn>1</mn><mn>0</mn></mfrac>"))
+        return (Term(1 / below.coefficient, below.below, below.above),)
+    if exponent == 1 or not base:
+        return base
+    if exponent == Fraction(1, 2):
+        return _one(Factor(f"<msqrt>{summed(base)}</msqrt>"))
+    if exponent.numerator == 1:
+        return _one(Factor(f"<mroot>{summed(base)}<mn>{exponent.denominator}</mn></mroot>"))
+    top = f"<mn>{exponent.numerator}</mn>"
+    whole = exponent.denominator == 1
+    return _one(_base(base).power(top if whole else _row(f"{top}<mo>/</mo><mn>{exponent.denominator}</mn>")))
+
+
+def _times(*factors: Sum) -> Sum:
+    result = Term(Fraction(1))
+    for terms in factors:
+        t = _single(terms)
+        result = Term(result.coefficient * t.coefficient, result.above + t.above, result.below + t.below)
+    above, below = (tuple(sorted(fs, key=lambda f: _key([f]))) for fs in (result.above, result.below))
+    return _bounded((Term(result.coefficient, above, below),)) if result.coefficient else ()
+
+
+def _single(terms: Sum) -> Term:
+    """The sum as one term, in parentheses if it has several."""
+    if len(terms) == 1:
+        return terms[0]
+    return Term(Fraction(1), (_enclosed(terms),)) if terms else Term(Fraction(0))
+
+
+def _base(terms: Sum) -> Factor:
+    """What can carry an exponent."""
+    if len(terms) == 1 and not terms[0].below:
+        c, above = terms[0].coefficient, terms[0].above
+        if len(above) == 1 and c == 1:
+            return above[0]
+        if not above and c.denominator == 1 and c > 0:
+            return Factor(number(c))
+    return _enclosed(terms)
+
+
+def _enclosed(terms: Sum) -> Factor:
+    return Factor(_parentheses(summed(terms)), terms=terms)
+
+
+def _sorted(terms: Sum) -> Sum:
+    """Monomials in the order of their names, as people write them; then other terms, in the order given; one number."""
+    constant = sum((t.coefficient for t in terms if not (t.above or t.below)), Fraction(0))
+    rest = sorted((t for t in terms if t.above or t.below), key=lambda t: _key((*t.above, *t.below)))
+    if constant == 0:
+        return _bounded(tuple(rest))
+    return _bounded((Term(constant), *rest) if constant > 0 else (*rest, Term(constant)))
+
+
+def _key(factors: Sequence[Factor]) -> tuple[Any, ...]:
+    plain = all(f.key for f in factors)
+    return not plain, tuple(f.key for f in factors if plain)
+
+
+def _bounded(terms: Sum) -> Sum:
+    size = sum(len(f.markup) for t in terms for f in (*t.above, *t.below))
+    return terms if size <= LONGEST else _one(Factor(_DOTS))
+
+
+def _negated(terms: Sum) -> Sum:
+    return tuple(replace(t, coefficient=-t.coefficient) for t in terms)
+
+
+def _one(factor: Factor) -> Sum:
+    return (Term(Fraction(1), (factor,)),)
+
+
+def _name(identifier: str) -> Factor:
+    head, colon, rest = identifier.partition(":")
+    key = natural_key(identifier)
+    if colon:
+        return Factor(f"<mi>{escape(_OWN.get(head, head))}</mi>", index=name(rest) if rest else "", key=key)
+    if identifier.isdigit():
+        return Factor(f"<mn>{identifier}</mn>")
+    found = re.fullmatch(r"([^\W\d_]+)_?([0-9]+)|([^\W_]+)_(\w+)", identifier)
+    stem, index = (found[1] or found[3], found[2] or found[4]) if found else (identifier, "")
+    letter = _GREEK.get(stem, stem)
+    return Factor(f"<mi>{escape(letter)}</mi>", index=name(index) if index else "", word=len(letter) > 1, key=key)
+
+
+def _product(coefficient: Fraction, factors: Sequence[Factor]) -> str:
+    if not factors:
+        return number(coefficient)
+    if len(factors) == 1 and coefficient == 1:
+        return factors[0].alone
+    joined = factors[0].markup if coefficient == 1 else f"{number(coefficient)}{_TIMES}{factors[0].markup}"
+    for before, after in pairwise(factors):
+        joined += (_DOT if before.word or after.word else _TIMES) + after.markup
+    return _row(joined)
+
+
+def _pieces(terms: Sum) -> list[str]:
+    """The terms; of a sum in parentheses with a factor, the factor and the terms inside."""
+    inner = next((f for f in terms[0].above if len(f.terms) > 3), None) if len(terms) == 1 else None
+    if inner is None:
+        return [summed(terms[:1]), *(f'<mo form="infix">{_sign(t)}</mo>{t.magnitude}' for t in terms[1:])]
+    factor = replace(terms[0], above=tuple(f for f in terms[0].above if f is not inner))
+    if factor == Term(Fraction(1)):
+        return _pieces(inner.terms)
+    scale = "" if factor in (Term(Fraction(1)), Term(Fraction(-1))) else factor.magnitude + _TIMES
+    minus = "<mo>−</mo>" if factor.coefficient < 0 else ""
+    first, *middle, last = _pieces(inner.terms)
+    return [f'{minus}{scale}<mo stretchy="false">(</mo>{first}', *middle, f'{last}<mo stretchy="false">)</mo>']
+
+
+def _sign(term: Term) -> str:
+    return "−" if term.coefficient < 0 else "+"
+
+
+def _is_decimal(value: Fraction) -> bool:
+    """Whether the value is a decimal of many digits: 0.6667 is hard to read as 6667/10000."""
+    rest = value.denominator
+    for prime in (2, 5):
+        while rest % prime == 0:
+            rest //= prime
+    return rest == 1 and value.denominator > 1000 and value.denominator % 5 == 0
+
+
+def _parentheses(markup: str) -> str:
+    flat = "" if any(tall in markup for tall in ("<mfrac", "<msqrt", "<mroot", "<mtable")) else ' stretchy="false"'
+    return _row(f"<mo{flat}>(</mo>{markup}<mo{flat}>)</mo>")
+
+
+def _row(markup: str) -> str:
+    return f"<mrow>{markup}</mrow>"

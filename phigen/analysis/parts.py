@@ -1,0 +1,70 @@
+"""Formulas with names for what occurs in them more than once: what makes large expressions readable."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from phigen.analysis.formulas import Formula, expanded
+from phigen.symbolic.expression import Expression, fold, raw, symbol, topological
+
+#: What has fewer leaves than this gets no name of its own, nor what saves fewer leaves.
+SMALL, WORTH = 3, 4
+
+#: Expressions with fewer leaves are written as they stand, or expanded where that is shorter.
+SHORT = 40
+
+
+@dataclass(frozen=True)
+class Readable:
+    """``forms`` of the expressions that were given, in the symbols ``part:1``, ``part:2``, … whose meaning is in
+    ``parts``. ``size`` counts the names and numbers of all of them."""
+
+    parts: tuple[tuple[str, Expression], ...]
+    forms: tuple[Formula | Expression, ...]
+    size: int
+
+
+def readable(expressions: Sequence[Expression]) -> Readable:
+    """Each expression expanded, as it stands, or with names for shared parts: whatever is short."""
+    trees = fold(expressions, lambda e, sizes: sum(sizes) or 1)
+    forms: dict[int, Formula | Expression] = {}
+    for i, (e, form) in enumerate(zip(expressions, expanded(expressions, None), strict=True)):
+        if form is not None and leaves(form) < min(trees[i], SHORT):
+            forms[i] = form
+        elif trees[i] <= SHORT:
+            forms[i] = e
+    long = [i for i in range(len(expressions)) if i not in forms]
+    parts, roots = with_names([expressions[i] for i in long])
+    forms |= dict(zip(long, roots, strict=True))
+    listed = tuple(forms[i] for i in range(len(expressions)))
+    return Readable(parts, listed, sum(map(leaves, [*listed, *(e for _, e in parts)])))
+
+
+def leaves(form: Formula | Expression) -> int:
+    """The number of names and numbers in a formula as it is written."""
+    if isinstance(form, Expression):
+        return fold([form], lambda e, sizes: sum(sizes) or 1)[0]
+    return sum(1 + sum(leaves(base) for base, _ in monomial) for _, monomial in form.terms)
+
+
+def with_names(roots: Sequence[Expression]) -> tuple[tuple[tuple[str, Expression], ...], list[Expression]]:
+    """Names for what occurs more than once and is worth one, and the roots in terms of these."""
+    uses: dict[int, int] = {}
+    order = topological(roots)
+    for e in order:
+        for a in e.args:
+            uses[id(a)] = uses.get(id(a), 0) + 1
+    for r in roots:
+        uses[id(r)] = uses.get(id(r), 0) + 1
+    parts: list[tuple[str, Expression]] = []
+    trees: dict[int, Expression] = {}
+    sizes: dict[int, int] = {}
+    for e in order:
+        tree = raw(e.op, tuple(trees[id(a)] for a in e.args), e.value)
+        size = sum(sizes[id(a)] for a in e.args) or 1
+        if size >= SMALL and (uses[id(e)] - 1) * (size - 1) >= WORTH and e.op != "neg":
+            parts.append((f"part:{len(parts) + 1}", tree))
+            tree, size = symbol(parts[-1][0]), 1
+        trees[id(e)], sizes[id(e)] = tree, size
+    return tuple(parts), [trees[id(r)] for r in roots]
