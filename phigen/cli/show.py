@@ -13,11 +13,7 @@ from phigen.cli.console import heading, out, verbosity
 from phigen.cli.sources import CORRECTIONS, ORDER, load_one, one_spec
 
 if TYPE_CHECKING:
-    from phigen.analysis.formulas import Formula
     from phigen.compiler import Compilation
-
-#: The leading term of the modified Hamiltonian costs one more coefficient of the series; beyond this it is left out.
-_MODIFIED_UP_TO = 6
 
 
 @click.command("show")
@@ -52,6 +48,8 @@ def command(spec_file: str, order: int | None, full: bool, modified: int, as_lat
 
 
 def _print(compilation: Compilation, most: int | None) -> None:
+    from phigen.analysis import generating
+
     spec, system = compilation.spec, compilation.system
     out(heading(f"{spec.name}: {spec.title}" if spec.title else spec.name))
     if system.parameters:
@@ -68,7 +66,7 @@ def _print(compilation: Compilation, most: int | None) -> None:
     if any("φ(" in line for line in maps):
         maps.append("where φ(s) = (1 − (√s/2) cot(√s/2))/s = 1/12 + s/720 + …")
     _section(f"Bi-realisation: {compilation.realisation.kind}", [*why, *maps])
-    _section(f"Generating function: {method(compilation)}", _assignments(_series(compilation, most)))
+    _section(f"Generating function: {generating.method(compilation)}", _assignments(_series(compilation, most)))
     _section("Generated code", _code(compilation))
 
 
@@ -81,19 +79,6 @@ def _section(title: str, lines: Sequence[str]) -> None:
 def _assignments(pairs: Sequence[tuple[str, str]]) -> list[str]:
     width = max((len(name) for name, _ in pairs), default=0)
     return [f"{name:<{width}} = {value}" for name, value in pairs]
-
-
-def method(compilation: Compilation) -> str:
-    """``order 6 from S_1 … S_5, symmetric: the even terms vanish``."""
-    from phigen.analysis.proof import stage_order
-
-    plan, stage = compilation.order, stage_order(compilation)
-    terms = "S_1" if stage.terms == 1 else f"S_1 … S_{stage.terms}"
-    if stage is not plan:
-        return f"order {plan.order}, composed of {len(compilation.program.fractions)} stages of order 2 from {terms}"
-    why = "symmetric, so the terms of even index vanish" if compilation.realisation.symmetric else "not symmetric"
-    note = f" ({plan.note})" if plan.note else ""
-    return f"order {plan.order} from {terms}; {why}{note}"
 
 
 def brackets(compilation: Compilation) -> list[tuple[str, str]]:
@@ -129,21 +114,6 @@ def _maps(compilation: Compilation, most: int | None) -> list[tuple[str, str]]:
     return result + [(f"β_{c}", t) for c, t in zip(names, readable(realisation.beta, most), strict=True)]
 
 
-def series_formulas(compilation: Compilation, most: int | None) -> tuple[list[tuple[int, Formula]], Formula | None]:
-    """The S_i that do not vanish, with their index; and −S_{p+1}, the leading term of the modified Hamiltonian.
-
-    The map of step h is the flow of H − h^p S_{p+1} + …, where p is the order and S the untruncated series.
-    """
-    from phigen.analysis.formulas import of_polynomial
-    from phigen.analysis.proof import stage_order
-
-    plan = stage_order(compilation)
-    more = plan is compilation.order and plan.order <= _MODIFIED_UP_TO
-    series = compilation.series(plan.order + 1 if more else plan.terms)
-    listed = [(i, of_polynomial(series.tower, s, most)) for i, s in enumerate(series.terms[: plan.terms], 1) if s != 0]
-    return listed, of_polynomial(series.tower, -series.terms[plan.order], most) if more else None
-
-
 def modified_formulas(compilation: Compilation, count: int, most: int | None) -> list[tuple[str, str]]:
     """H̃ = H + h^p H_p + …, and its first corrections; a gauge is that of the section before.
 
@@ -162,6 +132,8 @@ def modified_formulas(compilation: Compilation, count: int, most: int | None) ->
 
 
 def _series(compilation: Compilation, most: int | None) -> list[tuple[str, str]]:
+    from phigen.analysis.generating import series_formulas
+
     listed, correction = series_formulas(compilation, most)
     gauge = compilation.gauge
     taken = [f"λ_{c} {c}" for c in gauge.free] + [f"({value}) {c}" for c, value in gauge.fixed.items()]
@@ -197,6 +169,7 @@ def _files(compilation: Compilation) -> dict[str, str]:
 
 def _described(compilation: Compilation) -> dict[str, object]:
     from phigen.analysis.formulas import readable
+    from phigen.analysis.generating import series_formulas
     from phigen.analysis.proof import stage_order
 
     system, realisation, plan = compilation.system, compilation.realisation, compilation.order
