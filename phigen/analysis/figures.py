@@ -1,4 +1,4 @@
-"""Figures of runs: the trajectory, the errors of what should be conserved, Poincaré sections.
+"""Figures of runs: trajectories, errors of what should be conserved, Poincaré sections, convergence, work.
 
 Each function returns a `matplotlib.figure.Figure` and leaves matplotlib's global state as it was. The colours are those
 of `phigen.analysis.drawing.palette.PALETTE`; `save` and `svg` there write figures so that their bytes are a function of
@@ -11,20 +11,21 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from phigen.analysis.arrays import Floats
-from phigen.analysis.drawing import error_curves, phase_space, section_plane
+from phigen.analysis.drawing import error_curves, phase_space, precision_curves, section_plane
 from phigen.analysis.drawing.palette import PALETTE, SUFFIXES, save, styled, svg
+from phigen.analysis.precision import Study
 from phigen.runtime.trajectory import Trajectory
 from phigen.symbolic.expression import Expression
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["PALETTE", "SUFFIXES", "WIDTH", "error_figure", "run_figure", "save", "section_figure", "svg",
-           "trajectory_figure"]  # fmt: skip
+__all__ = ["PALETTE", "SUFFIXES", "WIDTH", "convergence_figure", "error_figure", "run_figure", "save",
+           "section_figure", "svg", "trajectory_figure", "work_precision_figure"]  # fmt: skip
 
 #: The widths of a page and of a single panel, in inches; PNG files have 200 dots per inch.
 WIDTH, NARROW = 7.2, 4.8
-_SECTION = 3.4
+_SECTION, _SQUARE = 3.4, 3.8
 
 
 @styled
@@ -57,6 +58,24 @@ def section_figure(sections: Mapping[str, Floats], names: Sequence[str]) -> Figu
     """Points (rows, DIM) of Poincaré sections by their labels, in a plane of two of the coordinates ``names``."""
     figure = _figure(_SECTION, NARROW)
     section_plane.draw_section(figure.add_subplot(), sections, names)
+    return figure
+
+
+@styled
+def convergence_figure(study: Study) -> Figure:
+    """Error at the end against the step size, one curve per method, each with a thin line of its stated order."""
+    figure = _figure(_SQUARE, NARROW)
+    precision_curves.draw_convergence(figure.add_subplot(), study)
+    return figure
+
+
+@styled
+def work_precision_figure(study: Study) -> Figure:
+    """Errors at the end against the time that the run took: of the solution and, if there are any, of the Casimirs."""
+    panels = [precision_curves.draw_work, precision_curves.draw_conserved][: 1 + study.has_casimirs]
+    figure = _figure(_SQUARE, WIDTH if len(panels) > 1 else NARROW)
+    for axes, draw in zip(figure.subplots(1, len(panels), squeeze=False)[0], panels, strict=True):
+        draw(axes, study)
     return figure
 
 

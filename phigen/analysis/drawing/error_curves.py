@@ -23,7 +23,7 @@ COLUMNS, ROW = 2, 2.3
 #: The unit in the last place, drawn as the level that nothing can be expected to stay below.
 ROUNDING = 2.0**-52
 
-_LINES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (1.2, 1.2)), (0, (5, 1.2, 1.2, 1.2)), (0, (8, 2)), (0, (2.5, 1)))
+LINES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (1.2, 1.2)), (0, (5, 1.2, 1.2, 1.2)), (0, (8, 2)), (0, (2.5, 1)))
 
 
 def windowed_maxima(t: Floats, values: Floats, windows: int = WINDOWS) -> tuple[Floats, Floats]:
@@ -85,7 +85,7 @@ def _draw_panel(axes: Any, curves: Mapping[str, tuple[Floats, Floats]]) -> None:
     axes.axhline(ROUNDING, color=PALETTE["muted"], linewidth=0.8, linestyle=(0, (1, 2)), zorder=1)
     for place, (label, (t, values)) in enumerate(curves.items()):
         style: dict[str, Any] = {"color": SERIES[place % len(SERIES)], "zorder": 3 - 0.1 * place}
-        line = _LINES[place % len(_LINES)]
+        line = LINES[place % len(LINES)]
         axes.plot(t, np.where(values > 0, values, np.nan), linestyle=line, linewidth=1.0, label=label, **style)
         none = t[values == 0]
         axes.plot(none, np.full(len(none), zero), ".", markersize=2.5, markeredgewidth=0, **style)
