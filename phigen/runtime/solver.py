@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 import operator
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from difflib import get_close_matches
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from phigen.errors import StepError
+from phigen.runtime.crossings import CrossingFinder, Function, Section
 from phigen.runtime.interface import Backend, BackendError, Floats, Interface, MissingExtraError, Progress, row_steps
 from phigen.runtime.session import rows_along
 from phigen.runtime.trajectory import Trajectory
@@ -110,6 +111,37 @@ class Solver:
             raise self._failure(error, h, None) from error
         return session.state(), tangent
 
+    def section(
+        self,
+        x0: ArrayLike,
+        h: float,
+        steps: int,
+        g: Function,
+        *,
+        progress: Progress | None = None,
+        parameters: Mapping[str, float] | None = None,
+        **more: float,
+    ) -> Section:
+        """Where ``g`` rises through zero along the trajectory of ``steps`` steps of size ``h`` from ``x0`` (DIM,).
+
+        ``g`` takes states (rows, DIM) and gives (rows,). Each crossing is found to round-off by steps of the solver
+        itself, from the state before it. A start with g = 0 counts if g rises from there. Raises `StepError`, whose
+        ``trajectory`` is the `Section` so far.
+        """
+        values = self._parameters(parameters, more)
+        start, h, steps = self._state(x0, "x0"), _step_size(h), _count(steps, "steps", 0)
+        found: list[tuple[float, Floats]] = []
+        finder = CrossingFinder(g, h)
+        try:
+            session = self.backend.start(start, values)
+            for _, crossings in finder.follow(session, steps, lambda: session.advance(h, 1)):
+                found += crossings
+                if progress:
+                    progress(session.steps)
+        except BackendError as error:
+            raise self._failure(error, h, self._section(found)) from error
+        return self._section(found)
+
     def ensemble(
         self, X0: ArrayLike, h: float, steps: int, *, parameters: Mapping[str, float] | None = None, **more: float
     ) -> Floats:
@@ -159,7 +191,11 @@ class Solver:
             coordinates=self.interface.coordinates,
         )
 
-    def _failure(self, error: BackendError, h: float, trajectory: Trajectory | Floats | None) -> StepError:
+    def _section(self, found: Sequence[tuple[float, Floats]]) -> Section:
+        t, x = np.array([t for t, _ in found]), np.array([x for _, x in found])
+        return Section(t, x.reshape(-1, self.interface.dimension), self.coordinates)
+
+    def _failure(self, error: BackendError, h: float, trajectory: Trajectory | Section | Floats | None) -> StepError:
         name = self.interface.name
         where = f"{name}: step {error.step} of size {h!r} failed" if error.step >= 0 else f"{name}: a step failed"
         if error.members:

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from phigen.runtime.interface import Floats
+from phigen.runtime.tables import Column, write
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,27 +44,24 @@ class Trajectory:
         return self.x[:, self.coordinates.index(coordinate)]
 
     def save(self, path: str | Path) -> None:
-        """Write a ``.csv`` or ``.npz`` file, by the suffix of the path; raises `ValueError` for any other."""
-        writers = {".csv": self.to_csv, ".npz": self.to_npz}
-        suffix = Path(path).suffix.lower()
-        if suffix not in writers:
-            raise ValueError(f"cannot save a trajectory as {str(path)!r}: the suffix must be .csv or .npz")
-        writers[suffix](path)
+        """Write a file by the suffix of the path; raises `ValueError` for any other.
 
-    def to_csv(self, path: str | Path) -> None:
-        """Write ``t,x1,…,energy,C…``, one line per row; every float reads back as the same float."""
-        table = np.column_stack([self.t, self.x, self.energy, *self.casimirs.values()])
-        with Path(path).open("w", newline="", encoding="utf-8") as file:
-            writer = csv.writer(file, lineterminator="\n")
-            writer.writerow(["t", *self.coordinates, "energy", *self.casimirs])
-            writer.writerows([repr(value) for value in row] for row in table.tolist())
+        ``.csv``: ``t,x1,…,energy,C…``, one line per row; every float reads back as the same float. ``.npz``: the arrays
+        t, x, energy, casimir_NAME, coordinates, and steps, h, parameter_NAME as scalars.
+        """
+        write(path, trajectory_columns(self.coordinates, tuple(self.casimirs)), self.rows(), self.scalars())
 
-    def to_npz(self, path: str | Path) -> None:
-        """Write the arrays t, x, energy, casimir_NAME, coordinates, and steps, h, parameter_NAME as scalars."""
-        arrays: dict[str, object] = {f"casimir_{name}": values for name, values in self.casimirs.items()}
-        arrays |= {f"parameter_{name}": value for name, value in self.parameters.items()}
-        arrays |= {"t": self.t, "x": self.x, "energy": self.energy, "coordinates": np.array(self.coordinates)}
-        arrays |= {"steps": self.steps, "h": self.h}
-        stored = {name: np.asarray(value) for name, value in arrays.items()}
-        with Path(path).open("wb") as file:  # given a name, numpy would append a suffix of its own
-            np.savez_compressed(file, allow_pickle=False, **stored)
+    def rows(self) -> Floats:
+        """All columns side by side, (rows, columns), as they are written to files."""
+        return np.column_stack([self.t, self.x, self.energy, *self.casimirs.values()])
+
+    def scalars(self) -> dict[str, Any]:
+        """What a ``.npz`` holds beside the columns."""
+        about = {"coordinates": np.array(self.coordinates), "steps": self.steps, "h": self.h}
+        return {**about, **{f"parameter_{name}": value for name, value in self.parameters.items()}}
+
+
+def trajectory_columns(coordinates: tuple[str, ...], casimirs: tuple[str, ...]) -> list[Column]:
+    """The columns of a table of states."""
+    first = [Column("t", ("t",), flat=True), Column("x", coordinates), Column("energy", ("energy",), flat=True)]
+    return [*first, *(Column(f"casimir_{name}", (name,), flat=True) for name in casimirs)]

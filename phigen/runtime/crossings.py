@@ -1,0 +1,215 @@
+"""Poincaré sections: where a function g of the state rises through zero, found by the integrator itself.
+
+Between two steps of size h the solution is followed by single steps of size θh, 0 < θ < 1, from the state before: the
+crossing is the θ for which g vanishes there, to round-off. So the points lie on the leaf, and nothing is interpolated.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from phigen.runtime.interface import BackendError, Floats
+from phigen.runtime.session import Session
+from phigen.runtime.tables import Column, write
+
+#: A function of states (rows, DIM), shape (rows,).
+Function = Callable[[Floats], Floats]
+
+#: Steps whose solvers are kept at a time.
+BLOCK = 64
+#: Numbers of equal steps that reach a point between two steps: more where one step does not converge from scratch.
+SUBSTEPS = (1, 2, 4, 8)
+#: Fractions of a step closer than this give the same state.
+_RESOLUTION = 1e-18
+_ITERATIONS = 100
+_GOLDEN = (math.sqrt(5) - 1) / 2
+
+
+@dataclass(frozen=True, eq=False)
+class Section:
+    """Crossings in the order they were met: times ``t`` (rows,) and states ``x`` (rows, DIM)."""
+
+    t: Floats
+    x: Floats
+    coordinates: tuple[str, ...]
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+    def __repr__(self) -> str:
+        return f"<Section of ({', '.join(self.coordinates)}): {len(self)} crossings>"
+
+    def save(self, path: str | Path) -> None:
+        """Write ``t,x1,…`` to a ``.csv`` file, or arrays t, x and coordinates to a ``.npz``; raises `ValueError`."""
+        rows = np.column_stack([self.t, self.x])
+        write(path, section_columns(self.coordinates), rows, {"coordinates": np.array(self.coordinates)})
+
+
+def section_columns(coordinates: tuple[str, ...]) -> list[Column]:
+    """The columns of a table of crossings."""
+    return [Column("t", ("t",), flat=True), Column("x", coordinates)]
+
+
+@dataclass
+class CrossingFinder:
+    """Follows a session in steps of size h and finds where g rises through zero as time increases.
+
+    An interval between two steps has one crossing at most. Where g has an extremum near a step and one sign around it,
+    it is looked up whether the sign changes twice there. A start on the section counts if g rises from it.
+
+    ``past`` holds solvers that stand at the last steps but the latest; ``values`` is g there and at the latest.
+    """
+
+    g: Function
+    h: float
+    past: list[Session] = field(default_factory=list)
+    values: list[float] = field(default_factory=list)
+
+    def follow(
+        self, session: Session, steps: int, move: Callable[[], object]
+    ) -> Iterator[tuple[Floats, list[tuple[float, Floats]]]]:
+        """Blocks of the states (rows, DIM) after each step that ``move`` made, and the crossings (t, x) before them.
+
+        Raises `BackendError` after the last state that there is.
+        """
+        if not self.values:
+            self.values = [self._value(session)]
+        while steps > 0:
+            states, failure, known = [], None, len(self.values) - 1
+            for _ in range(min(steps, BLOCK)):
+                before = session.branch()
+                try:
+                    move()
+                except BackendError as error:
+                    failure = error
+                    break
+                self.past.append(before)
+                states.append(session.state())
+            steps -= len(states)
+            if states:
+                rows = np.array(states)
+                self.values += self._values(rows).tolist()
+                yield rows, list(self._crossings(session.steps, known))
+                self.past, self.values = self.past[-1:], self.values[-2:]
+            if failure:
+                raise failure
+
+    def _values(self, states: Floats) -> Floats:
+        # A section is crossed where g rises in time, whether time goes forwards or backwards.
+        return math.copysign(1.0, self.h) * np.asarray(self.g(states), dtype=np.float64)
+
+    def _value(self, session: Session) -> float:
+        return float(self._values(session.state()[np.newaxis])[0])
+
+    def _crossings(self, latest: int, known: int) -> Iterator[tuple[float, Floats]]:
+        """The crossings of this block, whose first ``known`` intervals are those of an earlier one."""
+        v, first = self.values, latest - len(self.values) + 1
+        if known == 0 and v[0] == 0 < v[1]:
+            yield first * self.h, self.past[0].state()
+        for i in range(len(v) - 1):
+            if i >= 1 and (found := self._hidden(i)):
+                yield self._located(first, *found)
+            if i >= known and v[i] < 0 <= v[i + 1]:
+                yield self._located(first, i, 0.0, v[i], 1.0, v[i + 1])
+
+    def _hidden(self, i: int) -> tuple[int, float, float, float, float] | None:
+        """An interval before or after step i, and a bracket in it, where an extremum near step i changes the sign."""
+        a, b, c = self.values[i - 1 : i + 2]
+        peak = a < b >= c and b < 0
+        if not (peak or (a > b <= c and b >= 0 and a >= 0)):
+            return None
+        curvature = a - 2 * b + c
+        offset = (a - c) / (2 * curvature) if curvature else 0.0
+        gain = abs((a - c) * offset / 4)
+        # The parabola through three values is off by a fraction of its curvature.
+        if not abs(b) <= 2 * gain + 0.1 * abs(curvature):
+            return None
+        j = i - 1 if offset < 0 else i
+        at = self._extremum(j, -1.0 if peak else 1.0)
+        value = self._at(j, at)
+        if (value < 0) == (b < 0):
+            return None
+        return (j, 0.0, self.values[j], at, value) if peak else (j, at, value, 1.0, self.values[j + 1])
+
+    def _extremum(self, j: int, sign: float) -> float:
+        """Where sign·g is smallest in interval j, or where it is negative enough to have changed its sign."""
+        low, high = 0.0, 1.0
+        left, right = 1 - _GOLDEN, _GOLDEN
+        at_left, at_right = self._at(j, left), self._at(j, right)
+        while high - low > 1e-9:
+            for at, value in ((left, at_left), (right, at_right)):
+                if (value < 0) != (self.values[j] < 0):
+                    return at
+            if sign * at_left < sign * at_right:
+                high, right, at_right = right, left, at_left
+                left = high - _GOLDEN * (high - low)
+                at_left = self._at(j, left)
+            else:
+                low, left, at_left = left, right, at_right
+                right = low + _GOLDEN * (high - low)
+                at_right = self._at(j, right)
+        return left if sign * at_left < sign * at_right else right
+
+    def _at(self, j: int, fraction: float, substeps: Sequence[int] = SUBSTEPS) -> float:
+        return self._value(self._moved(j, fraction, substeps))
+
+    def _moved(self, j: int, fraction: float, substeps: Sequence[int]) -> Session:
+        """A solver that went a fraction of step j, in the first number of equal steps that works."""
+        for count in substeps:
+            session = self.past[j].branch()
+            try:
+                session.advance(fraction * self.h / count, count)
+            except BackendError:
+                if count == substeps[-1]:
+                    raise
+            else:
+                break
+        return session
+
+    def _located(
+        self, first: int, j: int, low: float, at_low: float, high: float, at_high: float
+    ) -> tuple[float, Floats]:
+        """Time and state of the crossing in interval j between two fractions of the step."""
+        for count in SUBSTEPS:
+            # The same number for all fractions: g is a smooth function of the fraction then.
+            try:
+                fraction = root(partial(self._at, j, substeps=(count,)), low, at_low, high, at_high)
+                state = self._moved(j, fraction, (count,)).state()
+            except BackendError:
+                if count == SUBSTEPS[-1]:
+                    raise
+            else:
+                break
+        return (first + j + fraction) * self.h, state
+
+
+def root(f: Callable[[float], float], low: float, at_low: float, high: float, at_high: float) -> float:
+    """The zero of f between two points with values of different sign, to the last bit that f tells apart.
+
+    Inverse quadratic interpolation where it is safe, else bisection: T. R. Chandrupatla, Adv. Eng. Software 28 (1997).
+    """
+    a, fa, b, fb = high, at_high, low, at_low
+    share = fa / (fa - fb)
+    for _ in range(_ITERATIONS):
+        best, value = (a, fa) if abs(fa) < abs(fb) else (b, fb)
+        least = (2 * np.finfo(float).eps * abs(best) + _RESOLUTION) / abs(b - a)
+        if value == 0 or least > 0.5:
+            break
+        at = a + min(1 - least, max(least, share)) * (b - a)
+        f_at = f(at)
+        if (f_at < 0) == (fa < 0):
+            c, fc = a, fa
+        else:
+            c, fc, b, fb = b, fb, a, fa
+        a, fa = at, f_at
+        xi, phi = (a - b) / (c - b), (fa - fb) / (fc - fb)
+        share = 0.5
+        if phi**2 < xi and (1 - phi) ** 2 < 1 - xi:
+            share = fa / (fb - fa) * fc / (fb - fc) + (c - a) / (b - a) * fa / (fc - fa) * fb / (fc - fb)
+    return best

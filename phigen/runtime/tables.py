@@ -1,0 +1,153 @@
+"""Tables of floats in files, written piece by piece: ``.csv`` text, or ``.npz`` arrays of NumPy.
+
+What was flushed is on the disk whatever happens to the process, and a table can be gone on with from there. A ``.csv``
+is complete at every time. The pieces of a ``.npz`` are collected in ``FILE.part``, plain rows of doubles.
+"""
+
+from __future__ import annotations
+
+import os
+import zipfile
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, BinaryIO, Protocol
+
+import numpy as np
+
+from phigen.runtime.interface import Floats
+
+SUFFIXES = (".csv", ".npz")
+
+_ROWS = 1 << 14  # rows that are copied at a time
+
+
+@dataclass(frozen=True)
+class Column:
+    """Neighbouring columns: ``names`` in the first line of a ``.csv``, the array ``key`` in a ``.npz``.
+
+    The array has shape (rows,) if it is ``flat``, else (rows, len(names)).
+    """
+
+    key: str
+    names: tuple[str, ...]
+    flat: bool = False
+
+
+class Table(Protocol):
+    """A table that is being written."""
+
+    def append(self, rows: Floats) -> None:
+        """Write rows (rows, columns)."""
+        ...
+
+    def flush(self) -> int:
+        """Hand what was written over to the disk; its size in bytes, which `opened` takes to go on from here."""
+        ...
+
+    def close(self, scalars: Mapping[str, Any], keep: bool = False) -> None:
+        """Make the file complete; ``scalars`` are further arrays of a ``.npz``. ``keep`` what is needed to go on."""
+        ...
+
+
+def opened(path: str | Path, columns: Sequence[Column], size: int | None = None) -> Table:
+    """A new table, or one to go on with from where `Table.flush` gave that size.
+
+    Raises `ValueError` for other suffixes than those of `SUFFIXES` and for files shorter than that, and `OSError`.
+    """
+    kinds: dict[str, Callable[[Path, Sequence[Column], int | None], Table]] = {".csv": CsvTable, ".npz": NpzTable}
+    suffix = Path(path).suffix.lower()
+    if suffix not in kinds:
+        raise ValueError(f"cannot write {str(path)!r}: the suffix must be {' or '.join(SUFFIXES)}")
+    return kinds[suffix](Path(path), columns, size)
+
+
+def write(path: str | Path, columns: Sequence[Column], rows: Floats, scalars: Mapping[str, Any]) -> None:
+    """Write a whole table."""
+    table = opened(path, columns)
+    table.append(rows)
+    table.close(scalars)
+
+
+class CsvTable:
+    """Comma-separated values; every float reads back as the same float."""
+
+    def __init__(self, path: Path, columns: Sequence[Column], size: int | None) -> None:
+        self._file = _opened(path, size)
+        if size is None:
+            self._file.write((",".join(name for c in columns for name in c.names) + "\n").encode())
+
+    def append(self, rows: Floats) -> None:
+        """See `Table`."""
+        self._file.write("".join(",".join(map(repr, row)) + "\n" for row in rows.tolist()).encode())
+
+    def flush(self) -> int:
+        """See `Table`."""
+        return _flushed(self._file)
+
+    def close(self, scalars: Mapping[str, Any], keep: bool = False) -> None:
+        """See `Table`; there is no place for scalars."""
+        self._file.close()
+
+
+class NpzTable:
+    """Arrays of NumPy, one for each of the columns."""
+
+    def __init__(self, path: Path, columns: Sequence[Column], size: int | None) -> None:
+        self._path, self._part, self._columns = path, path.with_name(path.name + ".part"), columns
+        self._file = _opened(self._part, size)
+
+    def append(self, rows: Floats) -> None:
+        """See `Table`."""
+        self._file.write(np.ascontiguousarray(rows, dtype="<f8").tobytes())
+
+    def flush(self) -> int:
+        """See `Table`."""
+        return _flushed(self._file)
+
+    def close(self, scalars: Mapping[str, Any], keep: bool = False) -> None:
+        """See `Table`."""
+        self._file.close()
+        width = sum(len(c.names) for c in self._columns)
+        count = self._part.stat().st_size // (8 * width)
+        rows: Floats = np.empty((0, width))
+        if count:  # an empty file cannot be mapped
+            rows = np.memmap(self._part, dtype="<f8", mode="r", shape=(count, width))
+        with zipfile.ZipFile(self._path, "w", zipfile.ZIP_DEFLATED) as archive:
+            first = 0
+            for column in self._columns:
+                self._store(archive, column, rows, first)
+                first += len(column.names)
+            for name, value in scalars.items():
+                with archive.open(f"{name}.npy", "w") as member:
+                    np.lib.format.write_array(member, np.asarray(value), allow_pickle=False)
+        del rows
+        if not keep:
+            self._part.unlink()
+
+    def _store(self, archive: zipfile.ZipFile, column: Column, rows: Floats, first: int) -> None:
+        count, width = len(rows), len(column.names)
+        shape = (count,) if column.flat else (count, width)
+        header = {"descr": "<f8", "fortran_order": False, "shape": shape}
+        with archive.open(f"{column.key}.npy", "w", force_zip64=True) as member:
+            np.lib.format.write_array_header_1_0(member, header)
+            for start in range(0, count, _ROWS):
+                member.write(rows[start : start + _ROWS, first : first + width].tobytes())
+
+
+def _opened(path: Path, size: int | None) -> BinaryIO:
+    if size is None:
+        return path.open("wb")
+    file = path.open("r+b")
+    if file.seek(0, os.SEEK_END) < size:
+        file.close()
+        raise ValueError(f"{path} has fewer than the {size} bytes that were written to it")
+    file.truncate(size)
+    file.seek(size)
+    return file
+
+
+def _flushed(file: BinaryIO) -> int:
+    file.flush()
+    os.fsync(file.fileno())
+    return file.tell()

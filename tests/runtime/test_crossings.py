@@ -1,0 +1,149 @@
+"""Poincaré sections, against closed forms."""
+
+import numpy as np
+import pytest
+from scipy.special import ellipj, ellipk
+from support import compiled, setting, solver
+
+from phigen.errors import StepError
+from phigen.runtime.crossings import CrossingFinder, root
+
+ULP = np.finfo(float).eps
+
+
+def oscillator(target):
+    return solver(compiled("harmonic_oscillator", 8), target)
+
+
+@pytest.mark.parametrize("target", ["c", "numpy"])
+def test_crossings_of_the_oscillator_are_at_the_exact_times(target):
+    # q = cos t rises through 0 at t = 3π/2 + 2πk.
+    section = oscillator(target).section([1, 0], 0.1, 1000, lambda x: x[:, 0])
+    expected = 1.5 * np.pi + 2 * np.pi * np.arange(16)
+    assert len(section) == 16
+    assert np.max(np.abs(section.t - expected)) < 1e-10
+    assert np.max(np.abs(section.x[:, 0])) < ULP
+    assert np.max(np.abs(section.x[:, 1] - 1)) < 1e-10
+
+
+def test_crossings_of_the_pendulum_are_at_the_exact_times():
+    # From rest at the angle a: sin(q/2) = k sn(t + K, k), k = sin(a/2); q rises through 0 at t = 3K, 7K, …
+    angle = 2.0
+    k = np.sin(angle / 2) ** 2
+    quarter = ellipk(k)
+    section = solver(compiled("pendulum", 10), "c").section([angle, 0], 0.05, 2000, lambda x: x[:, 0])
+    expected = quarter * (3 + 4 * np.arange(len(section)))
+    assert len(section) == 1 + (100 - 3 * quarter) // (4 * quarter)
+    assert np.max(np.abs(section.t - expected)) < 1e-10
+    assert np.max(np.abs(ellipj(section.t + quarter, k)[0])) < 1e-10
+    assert np.max(np.abs(section.x[:, 0])) < ULP
+
+
+@pytest.mark.parametrize("target", ["c", "numpy"])
+@pytest.mark.parametrize("name", ["henon_heiles", "rigid_body", "guiding_centre", "pendulum_euler", "predator_prey"])
+def test_crossings_lie_on_the_section_and_on_the_leaf(name, target):
+    """g is an inclined plane through the mean of the first steps: nothing about it is special."""
+    it, at = solver(compiled(name), target), setting(compiled(name))
+    steps = {"guiding_centre": 60, "rigid_body": 400}.get(name, 1000)
+    rows = it.integrate(at.x, at.h, steps, parameters=at.parameters)
+    normal = np.arange(1.0, len(at.x) + 1)
+    middle = normal @ (rows.x.max(axis=0) + rows.x.min(axis=0)) / 2
+    section = it.section(at.x, at.h, steps, lambda x: x @ normal - middle, parameters=at.parameters)
+    g = rows.x @ normal - middle
+    assert len(section) == np.sum((g[:-1] < 0) & (g[1:] >= 0)) > 0
+    size = np.abs(section.x) @ normal + abs(middle)
+    assert np.max(np.abs(section.x @ normal - middle) / size) < 4 * ULP
+    for casimir, values in it.casimirs(section.x, parameters=at.parameters).items():
+        assert np.max(np.abs(values - rows.casimirs[casimir][0])) < 1e-13 * max(1, abs(values[0]))
+    assert np.max(np.abs(it.hamiltonian(section.x, parameters=at.parameters) - rows.energy[0])) <= 2 * np.ptp(
+        rows.energy
+    )
+
+
+def test_a_step_in_a_block_of_its_own_changes_nothing():
+    session = oscillator("c").backend.start(np.array([1.0, 0.0]), {"m": 1.0, "k": 1.0})
+    finder = CrossingFinder(lambda x: x[:, 0], 0.1)
+    blocks = [next(finder.follow(session, 1, lambda: session.advance(0.1, 1))) for _ in range(1000)]
+    pieces = [crossing for _, found in blocks for crossing in found]
+    whole = oscillator("c").section([1, 0], 0.1, 1000, lambda x: x[:, 0])
+    assert [t for t, _ in pieces] == whole.t.tolist()
+    assert [x.tolist() for _, x in pieces] == whole.x.tolist()
+
+
+def test_crossings_closer_than_a_step_are_found():
+    # cos t stays above 1 − 1e-7 for 9e-4, a small part of a step.
+    level, half = 1 - 1e-7, np.arccos(1 - 1e-7)
+    above = oscillator("c").section([1, 0], 0.1, 1900, lambda x: x[:, 0] - level)
+    assert np.allclose(above.t, 2 * np.pi * np.arange(1, 31) - half, atol=1e-9)
+    below = oscillator("c").section([1, 0], 0.1, 1900, lambda x: x[:, 0] + level)
+    assert np.allclose(below.t, 2 * np.pi * np.arange(30) + np.pi + half, atol=1e-9)
+
+
+@pytest.mark.parametrize("level", [1.0, -1.0, 1 + 1e-9])
+def test_tangencies_end(level):
+    section = oscillator("c").section([1, 0], 0.1, 1000, lambda x: x[:, 0] - level)
+    assert len(section) <= 16
+    assert np.all(np.abs(section.x[:, 0] - level) < 4 * ULP)
+
+
+def test_sections_are_crossed_where_g_rises_in_time():
+    forwards = oscillator("c").section([0, 1], 0.1, 100, lambda x: x[:, 0])
+    backwards = oscillator("c").section([0, 1], -0.1, 100, lambda x: x[:, 0])
+    assert np.allclose(forwards.t, [0, 2 * np.pi])  # the start is on the section
+    assert np.allclose(backwards.t, [0, -2 * np.pi])
+    assert np.all(forwards.x[:, 1] > 0)
+    assert np.all(backwards.x[:, 1] > 0)
+
+
+def test_no_crossings_at_rest_or_away_from_the_section():
+    assert len(oscillator("c").section([0, 0], 0.1, 100, lambda x: x[:, 0])) == 0
+    assert len(oscillator("c").section([1, 0], 0.1, 100, lambda x: x[:, 0] - 2)) == 0
+
+
+def test_steps_too_large_to_be_made_from_scratch_are_divided(monkeypatch):
+    """A solver in the middle of a run knows where to look; one that starts anew may not converge."""
+    from phigen.runtime.c_solver import CSession
+    from phigen.runtime.interface import BackendError
+
+    advance = CSession.advance
+
+    def refusing(self, h, steps):
+        if h != 0.1 and h > 0.03:
+            raise BackendError("NO_CONVERGENCE", 0, np.empty((0, 2)))
+        advance(self, h, steps)
+
+    monkeypatch.setattr(CSession, "advance", refusing)
+    section = oscillator("c").section([1, 0], 0.1, 1000, lambda x: x[:, 0])
+    assert np.allclose(section.t, 1.5 * np.pi + 2 * np.pi * np.arange(16), atol=1e-10)
+    assert np.max(np.abs(section.x[:, 0])) < ULP
+
+
+def test_a_failing_run_keeps_its_crossings():
+    lotka = solver(compiled("lotka_volterra"), "c")
+    with pytest.raises(StepError) as caught:
+        lotka.section([-3, 5, 0.001], 0.001, 1000, lambda x: x[:, 1] - 6)
+    assert len(caught.value.trajectory) == 1
+
+
+def test_tables_of_crossings(tmp_path):
+    section = oscillator("c").section([1, 0], 0.1, 1000, lambda x: x[:, 0])
+    section.save(tmp_path / "s.csv")
+    section.save(tmp_path / "s.npz")
+    text = np.loadtxt(tmp_path / "s.csv", delimiter=",", skiprows=1)
+    assert text.tolist() == np.column_stack([section.t, section.x]).tolist()
+    with np.load(tmp_path / "s.npz") as stored:
+        assert stored["t"].tolist() == section.t.tolist()
+        assert stored["x"].tolist() == section.x.tolist()
+        assert stored["coordinates"].tolist() == ["q", "p"]
+    oscillator("c").section([1, 0], 0.1, 10, lambda x: x[:, 0]).save(tmp_path / "none.npz")
+    with np.load(tmp_path / "none.npz") as stored:
+        assert stored["x"].shape == (0, 2)
+
+
+@pytest.mark.parametrize(("f", "zero"), [(lambda x: x**3 - 0.1, 0.1 ** (1 / 3)), (lambda x: np.expm1(x - 0.7), 0.7),
+                                         (lambda x: np.sign(x - 0.3), 0.3), (lambda x: x**9, 0.0)])  # fmt: skip
+def test_roots_are_found_to_the_last_bits(f, zero):
+    asked = []
+    found = root(lambda x: asked.append(x) or f(x), -0.5, f(-0.5), 1.0, f(1.0))
+    assert abs(found - zero) < 1e-15
+    assert len(asked) < 90
