@@ -19,7 +19,7 @@ from phigen.errors import Diagnostic, SpecError, ToolchainError
 from phigen.geometry.system import System, system_from_spec
 from phigen.spec import limits
 from phigen.spec.model import Extras, Spec
-from phigen.spec.names import IDENTIFIER, KEYWORDS, SPEC_NAME
+from phigen.spec.names import IDENTIFIER, KEYWORDS, SCHEMES, SPEC_NAME
 
 if TYPE_CHECKING:
     from phigen.runtime.solver import Solver
@@ -42,20 +42,31 @@ def load(path: str | PathLike[str]) -> System:
         raise located(error, spec) from None
 
 
-def compile(source: Source, target: str = "auto", order: int | None = None, *, tangent: bool = False) -> Solver:
+def compile(
+    source: Source,
+    target: str = "auto",
+    order: int | None = None,
+    *,
+    scheme: str | None = None,
+    tangent: bool = False,
+) -> Solver:
     """A solver of a system: of one from `load` or `System.from_sympy`, of a spec, or of the path of a spec file.
 
     ``target`` is ``c``, ``numpy``, or ``auto``: C if there is a compiler, else NumPy. ``order`` overrides the
-    order of the spec; ``tangent`` asks for `Solver.step_tangent`. Compiled C is cached by its content. Raises
-    `SpecError`, `LimitError`, `CheckError` if the mathematics is refuted, e.g. since π is not Poisson, and
-    `ToolchainError` if C was asked for in vain.
+    order of the spec, ``scheme`` (``series``, ``splitting``, ``auto``) its scheme; ``tangent`` asks for
+    `Solver.step_tangent`. Compiled C is cached by its content. Raises `SpecError`, `LimitError`, `CheckError` if the
+    mathematics is refuted, e.g. since π is not Poisson, and `ToolchainError` if C was asked for in vain.
     """
     if target not in TARGETS:
         raise ValueError(f"unknown target {target!r}; there are {', '.join(TARGETS)}")
-    return solver_of(compilation_of(source, order, Extras(tangent=True) if tangent else None), target)
+    if scheme is not None and scheme not in SCHEMES:
+        raise ValueError(f"unknown scheme {scheme!r}; there are {', '.join(SCHEMES)}")
+    return solver_of(compilation_of(source, order, Extras(tangent=True) if tangent else None, scheme), target)
 
 
-def compilation_of(source: Source, order: int | None = None, extras: Extras | None = None) -> Compilation:
+def compilation_of(
+    source: Source, order: int | None = None, extras: Extras | None = None, scheme: str | None = None
+) -> Compilation:
     """The compilation of a source, proved; see `compile` for its arguments and errors.
 
     ``extras`` overrides those of the spec.
@@ -63,16 +74,17 @@ def compilation_of(source: Source, order: int | None = None, extras: Extras | No
     if order is not None and not (isinstance(order, int) and 1 <= order <= limits.ORDER):
         raise ValueError(f"order must be an integer from 1 to {limits.ORDER}, not {order!r}")
     if isinstance(source, Compilation):
-        if order is None and extras in (None, source.program.extras):
+        if order is None and scheme is None and extras in (None, source.program.extras):
             return source
         order = order or source.order.order
+        scheme = scheme or ("splitting" if source.splitting else "series")
         source = source.system
     if isinstance(source, System):
-        return compile_proved(source.spec or _spec_of(source), order=order, system=source, extras=extras)
+        return compile_proved(source.spec or _spec_of(source), order=order, scheme=scheme, system=source, extras=extras)
     if isinstance(source, Spec):
-        return compile_proved(source, order=order, extras=extras)
+        return compile_proved(source, order=order, scheme=scheme, extras=extras)
     if isinstance(source, str | PathLike):
-        return compile_proved(specs.load(source), order=order, extras=extras)
+        return compile_proved(specs.load(source), order=order, scheme=scheme, extras=extras)
     raise TypeError(f"cannot compile {type(source).__name__}; give a path, a System or a Spec")
 
 

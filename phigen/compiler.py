@@ -1,6 +1,7 @@
 """The pipeline, on one screen.
 
     spec file ─► Spec ─► System ─► BiRealisation ─► Program ─► source files
+                                └─► Splitting ─────┘
 
 Each stage is a function from one frozen dataclass to the next; `Compilation` keeps what each of them made and the
 seconds it took. The Hamilton–Jacobi series and the staging happen inside `build_program`.
@@ -12,7 +13,7 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from phigen import spec as specs
 from phigen.geometry.system import System, system_from_spec
@@ -20,11 +21,14 @@ from phigen.realisations.catalogue import realise
 from phigen.realisations.protocol import BiRealisation
 from phigen.scheme.assemble import build_program
 from phigen.scheme.discretisation import series_of
-from phigen.scheme.gauge import Gauge, choose
+from phigen.scheme.gauge import Gauge, choose, given
 from phigen.scheme.order import Order, plan_order
 from phigen.scheme.program import Program
+from phigen.scheme.splitting import build_splitting
+from phigen.scheme.splitting import plan as plan_splitting
 from phigen.series.hamilton_jacobi import PolynomialSeries
 from phigen.spec.model import Extras, Spec
+from phigen.splitting.parts import Splitting, split
 
 T = TypeVar("T")
 
@@ -35,11 +39,34 @@ class Compilation:
 
     spec: Spec
     system: System
-    realisation: BiRealisation
+    realisation: BiRealisation | None
     order: Order
     program: Program
     gauge: Gauge = field(default_factory=Gauge)
     seconds: Mapping[str, float] = field(default_factory=dict)
+    splitting: Splitting | None = None
+
+    @property
+    def chart(self) -> BiRealisation:
+        """The bi-realisation; a splitting has none, and must not be asked."""
+        if self.realisation is None:
+            raise ValueError(f"{self.spec.name} is compiled to a splitting, which has no bi-realisation")
+        return self.realisation
+
+    @property
+    def label(self) -> str:
+        """The kind of the method, for every place that names it to the user."""
+        return self.realisation.label if self.realisation else "splitting"
+
+    @property
+    def exact(self) -> bool:
+        """Whether a step is a Poisson map to round-off."""
+        return self.realisation is None or self.realisation.exact
+
+    @property
+    def symmetric(self) -> bool:
+        """Whether a step of −h undoes one of h."""
+        return self.realisation is None or self.realisation.symmetric
 
     @property
     def discretised(self) -> System:
@@ -48,46 +75,67 @@ class Compilation:
 
     def series(self, terms: int) -> PolynomialSeries:
         """S_1 … S_terms of `discretised`; the symbol ``gauge:C`` is the multiple of C that the solver chooses."""
-        return series_of(self.discretised, self.realisation, terms, self.gauge.symbols)
+        return series_of(self.discretised, self.chart, terms, self.gauge.symbols)
 
 
 def compile_spec(
-    spec: Spec, *, order: int | None = None, system: System | None = None, extras: Extras | None = None
+    spec: Spec,
+    *,
+    order: int | None = None,
+    scheme: str | None = None,
+    system: System | None = None,
+    extras: Extras | None = None,
 ) -> Compilation:
-    """Compile a spec; ``order`` overrides the order (and the terms) that it asks for, ``extras`` its extras.
+    """Compile a spec; ``order`` overrides the order (and the terms) that it asks for, ``scheme`` and ``extras`` too.
 
-    ``system`` is its system, where the caller has built it already.
-    Raises `SpecError` (no bi-realisation applies, …) and `LimitError` (the program would be too large).
+    ``system`` is its system, where the caller has built it already. Raises `SpecError` (no bi-realisation applies, H
+    does not split, …) and `LimitError` (the program would be too large).
     """
-    seconds: dict[str, float] = {}
-
-    def timed(stage: str, work: Callable[[], T]) -> T:
-        start = time.perf_counter()
-        result = work()
-        seconds[stage] = time.perf_counter() - start
-        return result
-
-    source = timed("system", lambda: system or system_from_spec(spec))
+    clock = _Clock()
+    source = clock.timed("system", lambda: system or system_from_spec(spec))
+    extras = extras or spec.extras
+    described: dict[str, Any] = {
+        "title": spec.title,
+        "licence": spec.license,
+        "spec_sha256": spec.source_sha256,
+        "extras": extras,
+    }
+    if (scheme or spec.scheme) == "splitting":
+        return _split(spec, source, order, described, clock)
     choice = replace(spec.birealisation, order=order) if order else spec.birealisation
-    realisation = timed("bi-realisation", lambda: realise(source, choice))
+    realisation = clock.timed("bi-realisation", lambda: realise(source, choice))
     plan = plan_order(order or spec.order, None if order else spec.terms, symmetric=realisation.symmetric)
-    gauge = timed("gauge", lambda: choose(source, realisation, spec.gauge))
-    program = timed(
+    gauge = clock.timed("gauge", lambda: choose(source, realisation, spec.gauge))
+    program = clock.timed(
         "program",
         lambda: build_program(
-            source,
-            realisation,
-            plan,
-            composition=spec.composition,
-            gauge=gauge,
-            solver=spec.solver,
-            extras=extras or spec.extras,
-            title=spec.title,
-            licence=spec.license,
-            spec_sha256=spec.source_sha256,
+            source, realisation, plan, composition=spec.composition, gauge=gauge, solver=spec.solver, **described
         ),
     )
-    return Compilation(spec, source, realisation, plan, program, gauge, seconds)
+    return Compilation(spec, source, realisation, plan, program, gauge, clock.seconds)
+
+
+def _split(spec: Spec, source: System, order: int | None, described: Mapping[str, Any], clock: _Clock) -> Compilation:
+    """Compile to a splitting."""
+    gauge = Gauge() if isinstance(spec.gauge, str) else given(source, spec.gauge)
+    splitting = clock.timed("splitting", lambda: split(gauge.applied(source)))
+    plan, method = plan_splitting(source, order or spec.order, spec.composition)
+    program = clock.timed("program", lambda: build_splitting(source, splitting, plan, method, gauge, **described))
+    return Compilation(spec, source, None, plan, program, gauge, clock.seconds, splitting)
+
+
+class _Clock:
+    """The seconds of each stage."""
+
+    def __init__(self) -> None:
+        self.seconds: dict[str, float] = {}
+
+    def timed(self, stage: str, work: Callable[[], T]) -> T:
+        """The result of a stage."""
+        start = time.perf_counter()
+        result = work()
+        self.seconds[stage] = time.perf_counter() - start
+        return result
 
 
 def compile_file(path: str | Path, *, order: int | None = None) -> Compilation:

@@ -45,15 +45,16 @@ def plain(given: spec.Spec) -> spec.Spec:
     return replace(given, gauge="none") if given.gauge == "auto" else given
 
 
-def compile_text(text: str, order: int | None = None) -> Compilation:
+def compile_text(text: str, order: int | None = None, scheme: str | None = None, **more: Any) -> Compilation:
     """The compilation of a spec given as YAML without its first two keys."""
-    return compile_spec(plain(spec.loads(f"phigen: 1\nname: t\n{text}")), order=order)
+    return compile_spec(plain(spec.loads(f"phigen: 1\nname: t\n{text}")), order=order, scheme=scheme, **more)
 
 
 @cache
-def compiled(name: str, order: int | None = None) -> Compilation:
+def compiled(name: str, order: int | None = None, scheme: str | None = None) -> Compilation:
     """The compilation of a system of the corpus."""
-    return compile_spec(plain(spec.load(resources.bundled_specs() / f"{name}.yaml")), order=order)
+    found = plain(spec.load(resources.bundled_specs() / f"{name}.yaml"))
+    return compile_spec(found, order=order, scheme=scheme)
 
 
 @cache
@@ -242,6 +243,8 @@ def _value(e: Expression, args: list[Any], at: Mapping[str, Any]) -> Any:
             return abs(args[0])
         case "sign":
             return mpmath.sign(args[0])
+        case "versin":
+            return 1 - mpmath.cos(args[0])
         case "phi0" | "phi1" | "phi2":
             return _phi(int(e.op[3:]), args[0])
     return getattr(mpmath, e.op)(*args)

@@ -16,7 +16,7 @@ def method(compilation: Compilation) -> str:
     terms = "S_1" if stage.terms == 1 else f"S_1 … S_{stage.terms}"
     if stage is not plan:
         return f"order {plan.order}, composed of {len(compilation.program.fractions)} stages of order 2 from {terms}"
-    why = "symmetric, so the terms of even index vanish" if compilation.realisation.symmetric else "not symmetric"
+    why = "symmetric, so the terms of even index vanish" if compilation.symmetric else "not symmetric"
     note = f" ({plan.note})" if plan.note else ""
     return f"order {plan.order} from {terms}; {why}{note}"
 

@@ -197,6 +197,8 @@ def _visit(node: Expression, args: list[Sum]) -> Sum:
             return _one(Factor("<mi>e</mi>").power(summed(args[0])))
         case "expm1":
             return (*_called("exp", args), Term(Fraction(-1)))
+        case "versin":
+            return (Term(Fraction(1)), *_negated(_called("cos", args)))
         case "abs":
             return _one(Factor(_row(f"<mo>|</mo>{summed(args[0])}<mo>|</mo>")))
     return _called(node.op, args)

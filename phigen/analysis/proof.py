@@ -16,13 +16,17 @@ from phigen.scheme.discretisation import formal_alpha
 from phigen.scheme.order import Order
 from phigen.series.hamilton_jacobi import residual
 from phigen.spec.model import Extras, Spec
+from phigen.splitting import statements
 from phigen.symbolic.verdict import REFUTED, UNDECIDED, Statement, decide_elements
 
 #: Statements by the part of the mathematics they belong to, in the order of the pipeline.
 Groups = Mapping[str, tuple[Statement, ...]]
 
 PREFIX = "bi-realisation: "
-METHOD = "Bi-realisation"
+METHOD, SPLITTING = "Bi-realisation", "Splitting"
+
+#: Where a spec says what a group of statements is about.
+_PLACES = {METHOD: ("birealisation",), SPLITTING: ("scheme",)}
 
 
 @dataclass(frozen=True)
@@ -51,7 +55,12 @@ class Examination:
 
 
 def examine(
-    spec: Spec, *, order: int | None = None, system: System | None = None, extras: Extras | None = None
+    spec: Spec,
+    *,
+    order: int | None = None,
+    scheme: str | None = None,
+    system: System | None = None,
+    extras: Extras | None = None,
 ) -> Examination:
     """Prove what can be proved about a spec, as far along the pipeline as it gets.
 
@@ -65,7 +74,7 @@ def examine(
     built = time.perf_counter()
     groups = _geometry(system)
     try:
-        compilation = compile_spec(spec, order=order, system=system, extras=extras)
+        compilation = compile_spec(spec, order=order, scheme=scheme, system=system, extras=extras)
     except SpecError as error:
         return Examination(spec, groups, obstacle=located(error, spec))
     groups = {**groups, **_method(compilation)}
@@ -76,14 +85,19 @@ def examine(
 
 
 def compile_proved(
-    spec: Spec, *, order: int | None = None, system: System | None = None, extras: Extras | None = None
+    spec: Spec,
+    *,
+    order: int | None = None,
+    scheme: str | None = None,
+    system: System | None = None,
+    extras: Extras | None = None,
 ) -> Compilation:
     """`compile_spec`, refusing what is refuted.
 
     Raises `CheckError` that names what is refuted, with the residual: no π that is not Poisson, no claimed Casimir
     that is none, no wrong bi-realisation reaches the output. Raises `SpecError` and `LimitError` as `compile_spec`.
     """
-    found = examine(spec, order=order, system=system, extras=extras)
+    found = examine(spec, order=order, scheme=scheme, system=system, extras=extras)
     if found.refuted:
         raise CheckError(refutation(found))
     if found.compilation is None:
@@ -97,9 +111,9 @@ def refutation(found: Examination) -> str:
     places: dict[str, tuple[str, ...]] = {f"{name} is a Casimir": ("casimirs", name) for name in spec.casimirs}
     places |= {f"{name} is invariant": ("invariants", name) for name in spec.invariants}
     lines = []
-    for group, statements in found.groups.items():
-        default = ("birealisation",) if group.startswith(METHOD) else ("poisson",)
-        refuted = (s for s in statements if s.verdict == REFUTED)
+    for group, listed in found.groups.items():
+        default = _PLACES.get(group.partition(" (")[0], ("poisson",))
+        refuted = (s for s in listed if s.verdict == REFUTED)
         lines += [str(spec.diagnostic(places.get(s.name, default), str(s))) for s in refuted]
     return "\n".join(lines)
 
@@ -114,16 +128,17 @@ def _geometry(system: System) -> Groups:
 
 
 def _method(compilation: Compilation) -> Groups:
-    stripped = [
-        replace(s, name=s.name.removeprefix(PREFIX)) for s in axioms.check(compilation.system, compilation.realisation)
-    ]
-    label = f"{METHOD} ({compilation.realisation.kind})"
+    if compilation.splitting:
+        return {SPLITTING: tuple(statements.check(compilation.discretised, compilation.splitting))}
+    found = axioms.check(compilation.system, compilation.chart)
+    stripped = [replace(s, name=s.name.removeprefix(PREFIX)) for s in found]
+    label = f"{METHOD} ({compilation.chart.kind})"
     return {label: tuple(stripped), "Hamilton–Jacobi series": tuple(series_statements(compilation))}
 
 
 def series_statements(compilation: Compilation) -> Iterator[Statement]:
     """S_1 … S_k solve the Hamilton–Jacobi equation; the S_i of even index vanish where the order rests on it."""
-    system, realisation, plan = compilation.discretised, compilation.realisation, stage_order(compilation)
+    system, realisation, plan = compilation.discretised, compilation.chart, stage_order(compilation)
     terms = plan.terms + (1 if realisation.symmetric else 0)  # S_{k+1} = 0 is what makes the order k + 1
     name = f"∂_t S_t = H(α(x, ∇S_t)) for S_t = {sum_of_terms(plan.terms)}"
     try:

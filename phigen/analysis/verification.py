@@ -96,8 +96,8 @@ class Subject:
 
     @property
     def exact(self) -> bool:
-        """Whether the bi-realisation is exact."""
-        return self.compilation.realisation.exact
+        """Whether a step is a Poisson map to round-off."""
+        return self.compilation.exact
 
 
 def verify(
@@ -125,11 +125,11 @@ def verify(
     subject = Subject(compilation, solver, own, others, parameters, x, h, made)
     rows = subject.main.rows(x, h, made, 1)
     states = [rows[i] for i in np.linspace(0, made, STATES, dtype=int)] if made >= STATES else [x]
-    realisation, order = compilation.realisation, compilation.order.order
+    order, symmetry = compilation.order.order, "symmetric" if compilation.symmetric else "not symmetric"
     return Verification(
         compilation.spec.name,
         run,
-        f"order {order}, {realisation.label}, {'symmetric' if realisation.symmetric else 'not symmetric'}",
+        f"order {order}, {compilation.label}, {symmetry}",
         h,
         made,
         tuple(own),
@@ -274,7 +274,7 @@ def one_step_checks(subject: Subject, states: Sequence[Floats]) -> Iterator[Chec
     reason = f"the tangent map is not the derivative of the step, {slip:.1e} off"
     yield Check("tangent map against differences", slip, f"at most {DIFFERENCES:g}", slip <= DIFFERENCES, reason)
     back = max(worst(measures.reversal, m) for m in subject.own.values())
-    symmetric = subject.compilation.realisation.symmetric
+    symmetric = subject.compilation.symmetric
     yield Check(
         "reversibility: a step there and back",
         back,
@@ -289,7 +289,7 @@ def _approximate(
     subject: Subject, states: Sequence[Floats], defect: Callable[[Method, Floats, float], float], found: float
 ) -> tuple[str, bool, str]:
     """The limit for a truncation of degree d: a defect of O(h^(d+1))."""
-    degree = subject.compilation.realisation.degree
+    degree = subject.compilation.chart.degree
     if degree is None:
         return "", True, ""
     fine = max(_or_infinite(defect, subject.main, x, subject.h / 2) for x in states)
@@ -323,11 +323,16 @@ def agreement_check(subject: Subject, states: Sequence[Floats]) -> Check:
 def modified_checks(subject: Subject, gauge: Floats | None) -> Iterator[Check]:
     """The modified Hamiltonian with m corrections is constant to order p + m, or p + 2m of a symmetric method."""
     compilation, solver = subject.compilation, subject.main
-    symmetric, system = compilation.realisation.symmetric, compilation.system
-    if len(compilation.program.fractions) > 1 or not subject.exact or compilation.order.order > MODIFIED_ORDER:
+    symmetric, system = compilation.symmetric, compilation.system
+    if (
+        compilation.splitting
+        or len(compilation.program.fractions) > 1
+        or not subject.exact
+        or compilation.order.order > MODIFIED_ORDER
+    ):
         return
     try:
-        found = corrections(system, compilation.realisation, compilation.order, CORRECTIONS, compilation.gauge)
+        found = corrections(system, compilation.chart, compilation.order, CORRECTIONS, compilation.gauge)
     except LimitError:
         return
     listed = powers(compilation.order, CORRECTIONS + 1, symmetric=symmetric)

@@ -43,6 +43,7 @@ def command(
     output: str,
     targets: tuple[str, ...],
     order: int | None,
+    scheme: str | None,
     single_file: bool,
     tangent: bool,
     modified: int | None,
@@ -59,7 +60,7 @@ def command(
     """
     if (checking or diff) and (compiling or certify):
         raise click.UsageError("--compile and --certify write files; --check and --diff write nothing")
-    options = Options(Path(output), tuple(dict.fromkeys(targets)), order, single_file, tangent, modified)
+    options = Options(Path(output), tuple(dict.fromkeys(targets)), order, single_file, tangent, modified, scheme)
     compilations = _compile_all(console, spec_files, options)
     planned = _plan(console, compilations, options)
     if checking or diff:
@@ -80,7 +81,8 @@ def _compile_all(console: Console, spec_files: Sequence[str], options: Options) 
     for spec in load_all(spec_files, collector):
         start = time.perf_counter()
         with collector.collecting():
-            compilations.append(compile_proved(spec, order=options.order, extras=options.extras_of(spec)))
+            extras = options.extras_of(spec)
+            compilations.append(compile_proved(spec, order=options.order, scheme=options.scheme, extras=extras))
             stages = ", ".join(f"{stage} {seconds:.2f}" for stage, seconds in compilations[-1].seconds.items())
             console.detail(f"{spec.name}: {time.perf_counter() - start:.2f} s ({stages})")
     collector.finish()
@@ -181,7 +183,8 @@ def _certify(console: Console, compilations: Sequence[Compilation], options: Opt
         )
         with collector.collecting():
             path.unlink(missing_ok=True)
-            subject = compile_proved(spec, order=options.order, extras=with_tangent(spec))
+            extras = with_tangent(spec)
+            subject = compile_proved(spec, order=options.order, scheme=options.scheme, extras=extras)
             verification = verified(subject, None, False, console, options.targets_of(compilation))
             if verification.failures:
                 raise fallen_short(verification)
@@ -209,7 +212,7 @@ def _report(console: Console, folder: Path, compilation: Compilation, changes: S
     said = [f"wrote {', '.join(written)}"] if written else []
     said += [f"removed {', '.join(removed)}, which the spec no longer gives"] if removed else []
     program = compilation.program
-    console.note(f"{folder}: {'; '.join(said) or 'unchanged'} (order {program.order}, {compilation.realisation.kind})")
+    console.note(f"{folder}: {'; '.join(said) or 'unchanged'} (order {program.order}, {compilation.label})")
     library = folder / _library(compilation.spec.name)
     if written and library.exists():
         console.note(f"{library} is older than its sources; --compile makes it anew")

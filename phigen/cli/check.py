@@ -10,7 +10,7 @@ import click
 
 from phigen.cli.console import Console, heading, out, pass_console, verbosity
 from phigen.cli.failures import Collector
-from phigen.cli.sources import ORDER, load_all, many_specs
+from phigen.cli.sources import ORDER, load_all, many_specs, scheme_option
 from phigen.errors import CheckError
 
 if TYPE_CHECKING:
@@ -23,14 +23,18 @@ _COLOURS = {"proved": "green", "refuted": "red", "checked numerically": "yellow"
 @click.command("check")
 @many_specs
 @click.option("--order", type=ORDER, help="Order of the method, instead of the spec's.")
+@scheme_option
 @click.option("--json", "as_json", is_flag=True, help="For machines: one object per spec.")
 @verbosity
 @pass_console
-def command(console: Console, spec_files: tuple[str, ...], order: int | None, as_json: bool) -> None:
+def command(
+    console: Console, spec_files: tuple[str, ...], order: int | None, scheme: str | None, as_json: bool
+) -> None:
     """Prove the mathematics of specs, or refute it.
 
     π is skew and satisfies the Jacobi identity; Casimirs and invariants are what they claim to be; α and β satisfy
-    the axioms of a bi-realisation; S_1 … S_k solve the Hamilton–Jacobi equation. Each statement is proved in exact
+    the axioms of a bi-realisation; S_1 … S_k solve the Hamilton–Jacobi equation; of a splitting, each flow solves its
+    own equation. Each statement is proved in exact
     arithmetic, refuted with a residual, or checked at points. Exit code 5 if anything is refuted.
     """
     from phigen.analysis.proof import examine
@@ -38,7 +42,7 @@ def command(console: Console, spec_files: tuple[str, ...], order: int | None, as
     collector, found = Collector(), []
     for spec in load_all(spec_files, collector):
         with collector.collecting():
-            examination = examine(spec, order=order)
+            examination = examine(spec, order=order, scheme=scheme)
             found.append(examination)
             if not as_json:
                 _print(examination)

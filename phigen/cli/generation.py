@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from phigen.cli.sources import CORRECTIONS, ORDER
+from phigen.cli.sources import CORRECTIONS, ORDER, scheme_option
 
 if TYPE_CHECKING:
     from phigen.compiler import Compilation
@@ -31,6 +31,7 @@ class Options:
     single_file: bool = False
     tangent: bool = False
     modified: int | None = None
+    scheme: str | None = None
 
     def extras_of(self, spec: Spec) -> Extras:
         """What the code offers beyond the solver: what the spec asks for, and the command line."""
@@ -55,6 +56,7 @@ class Options:
         """The options that reach the output, as on the command line."""
         words = [word for target in self.targets for word in ("-t", target)]
         words += ["--order", str(self.order)] if self.order else []
+        words += ["--scheme", self.scheme] if self.scheme else []
         words += ["--single-file"] if self.single_file else []
         words += ["--tangent"] if self.tangent else []
         words += ["--modified", str(self.modified)] if self.modified is not None else []
@@ -69,6 +71,7 @@ def output_options(command: F) -> F:
         ),
         click.option("--tangent", is_flag=True, help="Generate step_tangent, the derivative of a step, too."),
         click.option("--single-file", is_flag=True, help="C in one file, NAME.c, without a header."),
+        scheme_option,
         click.option("--order", type=ORDER, help="Order of the method, instead of the spec's."),
         click.option(
             "-t",
@@ -91,6 +94,7 @@ def generate(compilation: Compilation, target: str, options: Options) -> dict[st
     words = ["phigen build", f"{spec.name}.yaml"]
     words += ["-t", target] if target not in spec.targets else []
     words += ["--order", str(options.order)] if options.order not in (None, spec.order) else []
+    words += ["--scheme", options.scheme] if options.scheme not in (None, spec.scheme) else []
     words += ["--single-file"] if single else []
     words += ["--tangent"] if options.tangent and not spec.extras.tangent else []
     words += ["--modified", str(options.modified)] if options.modified is not None else []

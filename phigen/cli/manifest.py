@@ -20,7 +20,7 @@ from phigen._version import __version__
 from phigen.cli.generation import Options
 from phigen.errors import CheckError
 from phigen.spec import limits
-from phigen.spec.names import SPEC_NAME
+from phigen.spec.names import SCHEMES, SPEC_NAME
 
 FILE = "phigen-vendor.json"
 FORMAT = 1
@@ -139,6 +139,7 @@ def _options(name: str, given: dict[str, Any]) -> Options:
         not set(targets) <= {"c", "numpy"}
         or not (order is None or (type(order) is int and 1 <= order <= limits.ORDER))
         or not (modified is None or (type(modified) is int and 0 <= modified <= limits.CORRECTIONS))
+        or options.scheme not in (None, *SCHEMES)
         or "directory" in given
         or not all(isinstance(flag, bool) for flag in (options.single_file, options.tangent))
     ):

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from phigen.cli.console import Console, heading, out, pass_console, table, verbosity
-from phigen.cli.sources import ORDER, load_one, one_spec
+from phigen.cli.sources import ORDER, load_one, one_spec, scheme_option
 from phigen.errors import Diagnostic, SpecError, StepError
 
 if TYPE_CHECKING:
@@ -42,6 +42,7 @@ class Experiment:
 @click.option("--run", "name", metavar="NAME", help="Which run of the spec.  [default: the first]")
 @click.option("-t", "--target", type=click.Choice(["auto", "c", "numpy"]), default="auto", show_default=True)
 @click.option("--order", type=ORDER, help="Order of the method, instead of the spec's.")
+@scheme_option
 @click.option("--step", type=float, help="Step size, instead of the run's.")
 @click.option("--steps", type=click.IntRange(min=1), help="Number of steps, instead of the run's.")
 @click.option("--set", "settings", metavar="NAME=VALUE", multiple=True, help="A parameter, or an initial coordinate.")
@@ -55,6 +56,7 @@ def command(
     name: str | None,
     target: str,
     order: int | None,
+    scheme: str | None,
     step: float | None,
     steps: int | None,
     settings: tuple[str, ...],
@@ -71,7 +73,7 @@ def command(
         raise click.BadParameter(f"{output!r} must end in {' or '.join(_OUTPUTS)}", param_hint="--output")
     spec = load_one(spec_file)
     experiment = prepared(spec, name, step, steps, settings)
-    compilation = compilation_of(spec, order)
+    compilation = compilation_of(spec, order, scheme=scheme)
     solver = loaded(compilation, target, console)
     trajectory, failure = integrated(solver, experiment, console)
     if output:
@@ -208,7 +210,7 @@ def print_summary(
     run, name = experiment.run, compilation.spec.name
     end = trajectory.t[-1]
     out(heading(f"{name}, run {run.name}") + (f": {run.description}" if run.description else ""))
-    chosen = f"{compilation.realisation.label}, order {solver.order}, target {solver.target}"
+    chosen = f"{compilation.label}, order {solver.order}, target {solver.target}"
     out(f"  {trajectory.steps} steps of {float(run.step):.9g}, t = 0 … {end:.9g}; {chosen}")
     final = ", ".join(f"{c} = {v:.9g}" for c, v in zip(solver.coordinates, trajectory.x[-1].tolist(), strict=True))
     out(f"  final state: {final}\n")
@@ -252,8 +254,9 @@ def described_run(
         "run": experiment.run.name,
         "target": solver.target,
         "order": solver.order,
-        "birealisation": compilation.realisation.kind,
-        "exact": compilation.realisation.exact,
+        "birealisation": compilation.realisation.kind if compilation.realisation else None,
+        "scheme": "splitting" if compilation.splitting else "series",
+        "exact": compilation.exact,
         "step": float(experiment.run.step),
         "steps": trajectory.steps,
         "time": float(trajectory.t[-1]),

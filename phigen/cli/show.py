@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from phigen.cli.console import heading, out, verbosity
-from phigen.cli.sources import CORRECTIONS, ORDER, load_one, one_spec
+from phigen.cli.sources import CORRECTIONS, ORDER, load_one, one_spec, scheme_option
+from phigen.errors import Diagnostic, SpecError
 
 if TYPE_CHECKING:
     from phigen.compiler import Compilation
@@ -19,19 +20,28 @@ if TYPE_CHECKING:
 @click.command("show")
 @one_spec
 @click.option("--order", type=ORDER, help="Order of the method, instead of the spec's.")
+@scheme_option
 @click.option("--full", is_flag=True, help="All terms of long formulas.")
 @click.option("--modified", type=CORRECTIONS, default=0, help="So many corrections of the modified Hamiltonian.")
 @click.option("--latex", "as_latex", is_flag=True, help="The formulas as LaTeX, ready for \\input.")
 @click.option("--json", "as_json", is_flag=True, help="For machines: one object of texts.")
 @verbosity
-def command(spec_file: str, order: int | None, full: bool, modified: int, as_latex: bool, as_json: bool) -> None:
+def command(
+    spec_file: str,
+    order: int | None,
+    scheme: str | None,
+    full: bool,
+    modified: int,
+    as_latex: bool,
+    as_json: bool,
+) -> None:
     """Show the formulas of a spec: π, Casimirs, α, β, S_1 … S_k, the modified Hamiltonian, operation counts."""
     from phigen.analysis.formulas import SHOWN
     from phigen.api import compilation_of
 
     if as_latex and as_json:
         raise click.UsageError("--latex and --json exclude one another")
-    compilation = compilation_of(load_one(spec_file), order)
+    compilation = compilation_of(load_one(spec_file), order, scheme=scheme)
     if as_latex:
         from phigen.analysis.latex import document
 
@@ -48,7 +58,7 @@ def command(spec_file: str, order: int | None, full: bool, modified: int, as_lat
 
 
 def _print(compilation: Compilation, most: int | None) -> None:
-    from phigen.analysis import generating
+    from phigen.analysis import flows
 
     spec, system = compilation.spec, compilation.system
     out(heading(f"{spec.name}: {spec.title}" if spec.title else spec.name))
@@ -61,13 +71,22 @@ def _print(compilation: Compilation, most: int | None) -> None:
         _section("Casimirs", _assignments(_named(system.casimirs, most)))
     if system.invariants:
         _section("Invariants", _assignments(_named(system.invariants, most)))
-    why = textwrap.wrap(compilation.realisation.explanation, 100)
+    if compilation.splitting:
+        _section(f"Splitting: {flows.method(compilation)}", _assignments(flows.formulas(compilation, most)))
+    else:
+        _print_series(compilation, most)
+    _section("Generated code", _code(compilation))
+
+
+def _print_series(compilation: Compilation, most: int | None) -> None:
+    from phigen.analysis import generating
+
+    why = textwrap.wrap(compilation.chart.explanation, 100)
     maps = _assignments(_maps(compilation, most))
     if any("φ(" in line for line in maps):
         maps.append("where φ(s) = (1 − (√s/2) cot(√s/2))/s = 1/12 + s/720 + …")
-    _section(f"Bi-realisation: {compilation.realisation.kind}", [*why, *maps])
+    _section(f"Bi-realisation: {compilation.chart.kind}", [*why, *maps])
     _section(f"Generating function: {generating.method(compilation)}", _assignments(_series(compilation, most)))
-    _section("Generated code", _code(compilation))
 
 
 def _section(title: str, lines: Sequence[str]) -> None:
@@ -107,7 +126,7 @@ def _maps(compilation: Compilation, most: int | None) -> list[tuple[str, str]]:
     """α and β; of a symmetric pair, α alone and what β is."""
     from phigen.analysis.formulas import readable
 
-    realisation, names = compilation.realisation, compilation.system.coordinates
+    realisation, names = compilation.chart, compilation.system.coordinates
     result = [(f"α_{c}", t) for c, t in zip(names, readable(realisation.alpha, most), strict=True)]
     if realisation.symmetric:
         return [*result, ("β(x, p)", "α(x, −p)")]
@@ -122,7 +141,9 @@ def modified_formulas(compilation: Compilation, count: int, most: int | None) ->
     from phigen.analysis.formulas import of_polynomial
     from phigen.scheme.modified import corrections, expect_modified, powers
 
-    program, realisation = compilation.program, compilation.realisation
+    if compilation.splitting:
+        raise SpecError([Diagnostic("the modified Hamiltonian is not computed for a splitting")])
+    program, realisation = compilation.program, compilation.chart
     expect_modified(compilation.system, realisation, len(program.fractions))
     found = corrections(compilation.system, realisation, compilation.order, count, compilation.gauge)
     listed = powers(compilation.order, count, symmetric=realisation.symmetric)
@@ -168,12 +189,10 @@ def _files(compilation: Compilation) -> dict[str, str]:
 
 
 def _described(compilation: Compilation) -> dict[str, object]:
+    from phigen.analysis import flows
     from phigen.analysis.formulas import readable
-    from phigen.analysis.generating import series_formulas
-    from phigen.analysis.proof import stage_order
 
-    system, realisation, plan = compilation.system, compilation.realisation, compilation.order
-    listed, correction = series_formulas(compilation, None)
+    system, plan = compilation.system, compilation.order
     return {
         "name": compilation.spec.name,
         "title": compilation.spec.title,
@@ -184,6 +203,22 @@ def _described(compilation: Compilation) -> dict[str, object]:
         "hamiltonian": readable_one(system.hamiltonian, None),
         "casimirs": dict(_named(system.casimirs, None)),
         "invariants": dict(_named(system.invariants, None)),
+        "order": plan.order,
+        **(flows.described(compilation) if compilation.splitting else _described_series(compilation)),
+        "operations": dict(compilation.program.operations),
+        "files": {name: len(text.encode()) for name, text in _files(compilation).items()},
+    }
+
+
+def _described_series(compilation: Compilation) -> dict[str, object]:
+    from phigen.analysis.formulas import readable
+    from phigen.analysis.generating import series_formulas
+    from phigen.analysis.proof import stage_order
+
+    realisation, plan = compilation.chart, compilation.order
+    listed, correction = series_formulas(compilation, None)
+    return {
+        "scheme": "series",
         "birealisation": {
             "kind": realisation.kind,
             "symmetric": realisation.symmetric,
@@ -192,11 +227,8 @@ def _described(compilation: Compilation) -> dict[str, object]:
             "alpha": readable(realisation.alpha, None),
             "beta": readable(realisation.beta, None),
         },
-        "order": plan.order,
         "terms": stage_order(compilation).terms,
         "stages": list(compilation.program.fractions),
         "series": {f"S_{i}": {"formula": str(f), "terms": f.size} for i, f in listed},
         "modified_hamiltonian": None if correction is None else {"power": plan.order, "coefficient": str(correction)},
-        "operations": dict(compilation.program.operations),
-        "files": {name: len(text.encode()) for name, text in _files(compilation).items()},
     }

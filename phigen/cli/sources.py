@@ -12,6 +12,7 @@ import click
 from phigen.cli.failures import Collector
 from phigen.errors import Diagnostic, SpecError
 from phigen.spec import limits
+from phigen.spec.names import SCHEMES
 
 if TYPE_CHECKING:
     from phigen.spec.model import Spec
@@ -23,6 +24,11 @@ ORDER = click.IntRange(1, limits.ORDER)
 
 #: The type of ``--modified``.
 CORRECTIONS = click.IntRange(0, limits.CORRECTIONS)
+
+#: How the one-step map is made, instead of the spec's way.
+scheme_option = click.option(
+    "--scheme", type=click.Choice(SCHEMES), help="How steps are made, instead of the spec's scheme."
+)
 
 one_spec = click.argument("spec_file", metavar="SPEC", type=click.Path())
 many_specs = click.argument("spec_files", metavar="SPEC...", nargs=-1, required=True, type=click.Path())

@@ -67,6 +67,7 @@ def command(
     paths: tuple[str, ...],
     targets: tuple[str, ...],
     order: int | None,
+    scheme: str | None,
     single_file: bool,
     tangent: bool,
     modified: int | None,
@@ -85,7 +86,12 @@ def command(
     folder = Path(last)
     _expect_folder(folder, spec_files, checking)
     options = Options(
-        targets=tuple(dict.fromkeys(targets)), order=order, single_file=single_file, tangent=tangent, modified=modified
+        targets=tuple(dict.fromkeys(targets)),
+        order=order,
+        single_file=single_file,
+        tangent=tangent,
+        modified=modified,
+        scheme=scheme,
     )
     if options.words and not spec_files:
         raise click.UsageError("options that change what is generated need the SPEC; without it, the manifest decides")
@@ -169,7 +175,8 @@ def _made(order: Order, collector: Collector) -> Made | None:
 
     options = order.options
     with collector.collecting():
-        compilation = compile_proved(order.spec, order=options.order, extras=options.extras_of(order.spec))
+        extras = options.extras_of(order.spec)
+        compilation = compile_proved(order.spec, order=options.order, scheme=options.scheme, extras=extras)
         return Made(order, compilation, files_of(compilation, options))
     return None
 
@@ -214,7 +221,7 @@ def _done(folder: Path, made: Made, changes: Sequence[Change]) -> str:
     said = said or [f"{made.order.spec.name} unchanged"]
     if not made.order.found:
         said.append("from the manifest's copy of the spec, whose file is not there")
-    return f"{folder}: {'; '.join(said)} (order {made.compilation.program.order}, {made.compilation.realisation.kind})"
+    return f"{folder}: {'; '.join(said)} (order {made.compilation.program.order}, {made.compilation.label})"
 
 
 # -- checking

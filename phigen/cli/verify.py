@@ -12,7 +12,7 @@ import click
 
 from phigen.cli.console import Console, heading, out, pass_console, table, verbosity
 from phigen.cli.failures import Collector
-from phigen.cli.sources import ORDER, load_all, many_specs
+from phigen.cli.sources import ORDER, load_all, many_specs, scheme_option
 from phigen.errors import CheckError
 
 if TYPE_CHECKING:
@@ -27,12 +27,19 @@ _NOT_FINITE = {math.inf: "∞", -math.inf: "-∞"}
 @many_specs
 @click.option("--run", "name", metavar="NAME", help="Which run of the spec.  [default: the first]")
 @click.option("--order", type=ORDER, help="Order of the method, instead of the spec's.")
+@scheme_option
 @click.option("--quick", is_flag=True, help="Fewer steps.")
 @click.option("--json", "as_json", is_flag=True, help="For machines: one object per spec.")
 @verbosity
 @pass_console
 def command(
-    console: Console, spec_files: tuple[str, ...], name: str | None, order: int | None, quick: bool, as_json: bool
+    console: Console,
+    spec_files: tuple[str, ...],
+    name: str | None,
+    order: int | None,
+    scheme: str | None,
+    quick: bool,
+    as_json: bool,
 ) -> None:
     """Build every target of specs and measure what the solvers promise.
 
@@ -46,7 +53,8 @@ def command(
     for spec in load_all(spec_files, collector):
         with collector.collecting():
             extras = with_tangent(spec)
-            verification = verified(compile_proved(spec, order=order, extras=extras), name, quick, console)
+            compilation = compile_proved(spec, order=order, scheme=scheme, extras=extras)
+            verification = verified(compilation, name, quick, console)
             found.append(verification)
             if not as_json:
                 print_table(verification)

@@ -72,7 +72,7 @@ def _node(e: Any, args: list[Expression]) -> Expression:
         return power(args[0], args[1])
     name = type(e).__name__
     name = _FROM_SYMPY.get(name, name)
-    if FUNCTIONS.get(name) == len(args) and name not in ("power", "expm1", *SPECIAL):
+    if FUNCTIONS.get(name) == len(args) and name not in ("power", "expm1", "versin", *SPECIAL):
         return call(name, *args)
     raise SpecError([Diagnostic(f"{e} has no counterpart in phigen", hint=f"known functions: {', '.join(FUNCTIONS)}")])
 
@@ -104,6 +104,8 @@ def to_sympy(e: Expression) -> Any:
                 return args[0] ** args[1]
         if node.op == "expm1":
             return sympy.exp(args[0]) - 1
+        if node.op == "versin":
+            return 1 - sympy.cos(args[0])
         if node.op in SPECIAL:
             return sympy.Function(r"\varphi" + "'" * order_of(node.op))(*args)
         return getattr(sympy, _TO_SYMPY.get(node.op, node.op))(*args)

@@ -107,7 +107,9 @@ def _composed(
     found = find(name, order.order)
     if found is None or not realisation.symmetric:
         reason = (
-            f"composition {name} offers the orders {orders(name)}, not {order.order}"
+            f"composition {name} composes the parts of a splitting; it needs scheme: splitting"
+            if name == "blanes-moan"
+            else f"composition {name} offers the orders {orders(name)}, not {order.order}"
             if realisation.symmetric
             else f"composition {name} needs a symmetric bi-realisation; {realisation.kind} is not"
         )

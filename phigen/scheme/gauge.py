@@ -63,14 +63,7 @@ def choose(system: System, realisation: BiRealisation, setting: str | Mapping[st
     more terms with it (on tops it has many more, for little).
     """
     if not isinstance(setting, str):
-        for name in setting:
-            if name not in system.casimirs:
-                known = ", ".join(system.casimirs) or "none"
-                place = system.locations.get(("gauge", name)) or system.locations.get(("gauge",))
-                raise SpecError(
-                    [Diagnostic(f"gauge: {name} is not a Casimir of this system", place, f"known: {known}")]
-                )
-        return Gauge(fixed=setting)
+        return given(system, setting)
     if setting == "none" or not realisation.exact or not realisation.symmetric:
         return Gauge()
     free: list[str] = []
@@ -80,6 +73,16 @@ def choose(system: System, realisation: BiRealisation, setting: str | Mapping[st
         if gauged is not None and plain is not None and _worthwhile(plain, gauged, system, f"gauge:{name}"):
             free.append(name)
     return Gauge(tuple(free))
+
+
+def given(system: System, values: Mapping[str, Expression]) -> Gauge:
+    """The gauge with these multiples of Casimirs. Raises `SpecError` for names of other functions."""
+    for name in values:
+        if name not in system.casimirs:
+            known = ", ".join(system.casimirs) or "none"
+            place = system.locations.get(("gauge", name)) or system.locations.get(("gauge",))
+            raise SpecError([Diagnostic(f"gauge: {name} is not a Casimir of this system", place, f"known: {known}")])
+    return Gauge(fixed=values)
 
 
 def _guide(system: System, realisation: BiRealisation, gauge: Gauge) -> PolynomialSeries | None:

@@ -12,6 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from phigen._version import __version__
+from phigen.scheme.alternation import Schedule
 from phigen.scheme.path import Path
 from phigen.spec.model import NO_EXTRAS, Extras, Parameter
 from phigen.symbolic.expression import Expression
@@ -48,11 +49,13 @@ class Kernel:
 
 @dataclass(frozen=True)
 class Program:
-    """A solver, ready to be printed. ``driver`` is ``newton``, ``explicit`` or ``path``.
+    """A solver, ready to be printed. ``driver`` is ``newton``, ``explicit``, ``path`` or ``splitting``.
 
-    ``path`` holds the recurrences of a path driver. A step of size h is the composition of one step of each
-    of the ``fractions`` of h. ``tangent_path`` is the path with its variation (`phigen.scheme.tangent`), if ``extras``
-    ask for the tangent map. ``gauge`` names the Casimirs whose multiple the solver chooses for each trajectory.
+    ``schedule`` lists the flows of a step of a splitting, whose kernels are ``flow1``, ``flow2``, …; there is a table
+    of coefficients for each row of the schedule. ``path`` holds the recurrences of a path driver. A step of size h is
+    the composition of one step of each of the ``fractions`` of h. ``tangent_path`` is the path with its variation
+    (`phigen.scheme.tangent`), if ``extras`` ask for the tangent map. ``gauge`` names the Casimirs whose multiple the
+    solver chooses for each trajectory.
 
     ``relative`` tells that the coordinates are positive or keep their sign (log-canonical π), so that errors
     of the inner solve count relative to each coordinate. ``facts`` are the lines of the header.
@@ -68,6 +71,7 @@ class Program:
     coefficients: int
     kernels: Mapping[str, Kernel]
     path: Path | None = None
+    schedule: Schedule | None = None
     fractions: tuple[float, ...] = (1.0,)
     gauge: tuple[str, ...] = ()
     extras: Extras = NO_EXTRAS
@@ -89,7 +93,9 @@ class Program:
     @property
     def driver_unit(self) -> str:
         """What the operation counts of the header refer to."""
-        return {"explicit": "step", "newton": "Newton iteration"}.get(self.driver, "evaluation of the equation for p")
+        return {"explicit": "step", "splitting": "step", "newton": "Newton iteration"}.get(
+            self.driver, "evaluation of the equation for p"
+        )
 
     @property
     def dimension(self) -> int:

@@ -24,13 +24,15 @@ def variation(name: str) -> str:
     return f"v:{name}"
 
 
-def explicit_jacobian(explicit: Kernel, coordinates: Sequence[str], coefficients: Coefficients) -> Kernel:
-    """The Jacobian (n×n) of the increment of an explicit step."""
+def explicit_jacobian(
+    explicit: Kernel, coordinates: Sequence[str], coefficients: Coefficients, name: str = "explicit_tangent"
+) -> Kernel:
+    """The Jacobian (n×n) of the increment of an explicit step, or of a flow."""
     columns = [derivatives(explicit.roots, c) for c in coordinates]
     n = len(coordinates)
     flat = coefficients.hoist([columns[j][i] for i in range(n) for j in range(n)])
     return Kernel(
-        "explicit_tangent",
+        name,
         "the Jacobian of the increment of one step",
         {"coef": coefficients.slots, "state": tuple(coordinates)},
         (Output("increment_jacobian", tuple(flat)),),

@@ -24,6 +24,7 @@ from phigen.spec.names import (
     FAMILY_HELP,
     IDENTIFIER,
     PLANNED,
+    SCHEMES,
     SPEC_NAME,
 )
 from phigen.spec.yaml_source import Mapping, Scalar, Sequence
@@ -191,7 +192,7 @@ SPEC = Record(
             "Casimirs subtracted from H before discretising",
             default="auto",
         ),
-        Field("scheme", _switch("scheme", "auto"), "how the one-step map is arranged", default="auto"),
+        Field("scheme", _switch("scheme", *SCHEMES), "how the one-step map is made", default="auto"),
         Field("solver", SOLVER, "the inner solve of a step"),
         Field("tangent", Boolean(), "also generate step_tangent, the derivative of a step", default=False),
         Field(

@@ -9,7 +9,7 @@ from phigen.symbolic.expression import FUNCTIONS
 from phigen.symbolic.special import SPECIAL
 
 #: Functions of expressions with their number of arguments; ``sign``, ``power`` and φ are phigen's own.
-_OWN = ("sign", "power", "expm1", *SPECIAL)
+_OWN = ("sign", "power", "expm1", "versin", *SPECIAL)
 SPEC_FUNCTIONS: dict[str, int] = {"sqrt": 1} | {f: n for f, n in FUNCTIONS.items() if f not in _OWN}
 
 SPEC_NAME = r"[a-z][a-z0-9_]{0,30}"
@@ -78,11 +78,12 @@ BIREALISATIONS = (
     "custom",
 )
 POISSON_FORMS = ("matrix", "brackets", "canonical", "log_canonical", "lie_algebra", "nambu", "product", "pullback")
-COMPOSITIONS = ("auto", "none", "suzuki", "triple-jump", "kahan-li", "yoshida")
+COMPOSITIONS = ("auto", "none", "suzuki", "triple-jump", "kahan-li", "yoshida", "sofroniou-spaletta", "blanes-moan")
+SCHEMES = ("auto", "series", "splitting")
 PLANNED: dict[str, tuple[str, ...]] = {
     "birealisation": (),
     "poisson": (),
-    "composition": ("blanes-moan",),
+    "composition": (),
     "gauge": (),
     "scheme": (),
 }

@@ -41,6 +41,7 @@ def validate(data: bytes, file: str) -> Spec:
     reader = Reader(problems)
     raw = SPEC.read(read(source, problems), (), reader) or {}
     parts = _parts(raw, declare(raw, reader))
+    _expect_consistent(raw, problems, reader)
     problems.finish()
     digest = hashlib.sha256(source.encode()).hexdigest()
     return Spec(**parts, source_sha256=digest, file=file, source=source, locations=reader.locations)
@@ -72,6 +73,19 @@ def _parts(raw: Mapping[str, Any], declared: Declarations) -> dict[str, Any]:
         "references": (references,) if isinstance(references, str) else tuple(r for r in references if r),
         "license": _license(raw.get("license", "0BSD"), declared),
     }
+
+
+#: Keys of the Hamilton–Jacobi series, which mean nothing to a splitting, and the values that do no harm.
+SERIES_KEYS = {"terms": (), "birealisation": ("auto",), "modified_hamiltonian": (0,)}
+
+
+def _expect_consistent(raw: Mapping[str, Any], problems: Problems, reader: Reader) -> None:
+    if raw.get("scheme") != "splitting":
+        return
+    for key, harmless in SERIES_KEYS.items():
+        if key in raw and raw[key] is not None and raw[key] not in harmless:
+            message = f"{key} belongs to scheme: series; scheme: splitting follows exact flows of parts of H"
+            problems.add(message, reader.locations[key,], f"remove {key}, or the scheme")
 
 
 def _name(node: Scalar | None, declared: Declarations) -> str:

@@ -40,6 +40,7 @@ from phigen.symbolic.special import SPECIAL, coefficient, order_of
 FUNCTIONS: dict[str, int] = {
     "exp": 1,
     "expm1": 1,  # exp(a) − 1 without cancellation, of phigen's own, not accepted in a spec
+    "versin": 1,  # 1 − cos(a) without cancellation, likewise
     "log": 1,
     "sin": 1,
     "cos": 1,
@@ -441,6 +442,8 @@ def partials(e: Expression) -> list[Expression]:
             return [e]
         case "expm1":
             return [1 + e]
+        case "versin":
+            return [call("sin", a)]
         case "log":
             return [1 / a]
         case "sin":

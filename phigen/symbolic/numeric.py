@@ -129,6 +129,8 @@ def _visitor(
                 return convert((args[0] > 0) - (args[0] < 0))
         if library is None:
             raise DomainError(f"{node.op} is not rational")
+        if node.op == "versin":
+            return 2 * library.sin(args[0] / 2) ** 2
         if node.op in ("pi", "E"):
             return +getattr(library, node.op.lower())
         if node.op in SPECIAL:

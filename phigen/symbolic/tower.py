@@ -184,6 +184,8 @@ class Tower:
             return self.function("sign", args) * args[0]
         if name == "expm1":
             return self.function("exp", args) - 1
+        if name == "versin":
+            return 1 - self.function("cos", args)
         first = args[0]
         if name in SPECIAL:
             return self._special(order_of(name), first)

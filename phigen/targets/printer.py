@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from fractions import Fraction
 
 from phigen.symbolic.expression import Expression, fold
@@ -18,7 +18,7 @@ class Printer:
     """Prints lowered trees (see `phigen.scheme.lowering`); a target gives names, literals and functions."""
 
     def __init__(
-        self, name: Callable[[str], str], functions: dict[str, str], constants: dict[str, str], power: str
+        self, name: Callable[[str], str], functions: Mapping[str, str], constants: Mapping[str, str], power: str
     ) -> None:
         self.name, self.functions, self.constants, self.power = name, functions, constants, power
 
@@ -60,8 +60,8 @@ class Printer:
                 return self.constants[e.op], ATOM
             case op if op in SPECIAL:  # a function of the generated file, whose name is chosen there
                 return f"{self.name('function:' + op)}({args[0][0]})", ATOM
-            case "sign":
-                return self.functions["sign"].format(args[0][0]), ATOM
+            case op if "{0}" in self.functions[op]:
+                return self.functions[op].format(args[0][0]), ATOM
             case _:
                 return f"{self.functions[e.op]}({', '.join(a for a, _ in args)})", ATOM
 

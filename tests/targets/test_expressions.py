@@ -25,6 +25,7 @@ ARGUMENTS |= {
     "atanh": (-y,),
     "log": (x,),
     "expm1": (y,),
+    "versin": (y,),
     "abs": (y - z,),
     "sign": (x - y,),
 }

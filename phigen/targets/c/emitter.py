@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from phigen.scheme.program import Program
 from phigen.targets import special
-from phigen.targets.c import extras
+from phigen.targets.c import extras, splitting
 from phigen.targets.c.kernels import apart, function, members, printer, wrapped_arguments
 from phigen.targets.header import CHECKSUM, checksum, header_lines, plain
 from phigen.targets.path import Syntax, kinds, reads_coefficients, statements
@@ -158,8 +158,9 @@ def _body(program: Program) -> str:
 
     pieces = [_render("preamble.c", values)]
     pieces += [_render("phi.c", special.values(f, f"{program.name}_{f}")) for f in special.used(program)]
-    pieces.append(static("prepare"))
-    if program.driver != "explicit":
+    if program.driver != "splitting":
+        pieces.append(static("prepare"))
+    if program.driver not in ("explicit", "splitting"):
         pieces += [static("generate" if program.path else "linearise"), _render("pivoting.c", values)]
         if "eliminate" in kernels:
             pieces += [static("eliminate"), _render("unrolled.c", values)]
@@ -173,6 +174,8 @@ def _body(program: Program) -> str:
         pieces += [_render("path.c", values), _render("path_step.c", values)]
     elif program.driver == "newton":
         pieces += [_render("size_relative.c" if program.relative else "size.c", values), _render("newton.c", values)]
+    elif program.driver == "splitting":
+        pieces += splitting.pieces(program, values)
     else:
         pieces += [static("explicit"), _render("explicit.c", values)]
     pieces.append(_render("compose.c", values))

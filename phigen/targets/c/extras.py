@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from phigen.scheme.program import Program
+from phigen.targets.c import splitting
 from phigen.targets.c.kernels import function, wrapped_arguments
 from phigen.targets.path import Syntax, kinds, reads_coefficients, statements, tangent_program
 from phigen.targets.rendering import render
@@ -68,6 +69,8 @@ def tangent(program: Program, values: Mapping[str, object], syntax: Syntax) -> l
     """The functions of the tangent map; they come after the driver and before the API."""
     own = {**values, "step_tangent_signature": "\n".join(_step_tangent(program))}
     pieces = [render("c", "tangent_algebra.c", own)]
+    if program.driver == "splitting":
+        return [*pieces, *splitting.tangent(program, own), render("c", "step_tangent.c", own)]
     if program.driver != "explicit":
         pieces += [render("c", "tangent_solve.c", own)]
     if program.driver == "explicit":

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from phigen.scheme.program import Kernel, Program
 from phigen.symbolic.special import SPECIAL
@@ -18,6 +18,7 @@ FUNCTIONS = {name: name for name in _SAME} | {
     "abs": "fabs",
     "power": "pow",
     "sign": "(double)(({0} > 0.0) - ({0} < 0.0))",
+    "versin": "(2.0 * sin(0.5 * ({0})) * sin(0.5 * ({0})))",
 }
 # Digits, since -std=c99 hides M_PI.
 CONSTANTS = {"pi": "3.141592653589793", "E": "2.718281828459045"}
@@ -26,15 +27,20 @@ CONSTANTS = {"pi": "3.141592653589793", "E": "2.718281828459045"}
 LONGEST_FUNCTION = 200
 
 
-def function(program: Program, kernel: Kernel, *, exported: bool = False) -> str:
-    """The C source of a kernel: one function, or a chain of static ones that share a workspace."""
+def function(
+    program: Program, kernel: Kernel, *, exported: bool = False, functions: Mapping[str, str] = FUNCTIONS
+) -> str:
+    """The C source of a kernel: one function, or a chain of static ones that share a workspace.
+
+    ``functions`` are the names of those that it calls.
+    """
     pieces = parts(lower(kernel), LONGEST_FUNCTION)
     workspace = 1 + max((int(a.target[2:]) for p in pieces for a in p.assignments if a.target[:2] == "w:"), default=0)
     name = f"{program.name}_{kernel.name}"
     if len(pieces) == 1:
-        return _definition(program, kernel, name, pieces[0], exported=exported)
+        return _definition(program, kernel, name, pieces[0], functions, exported=exported)
     texts = [
-        _definition(program, kernel, f"{name}_part{k}", piece, workspace=workspace, part=(k, len(pieces)))
+        _definition(program, kernel, f"{name}_part{k}", piece, functions, workspace=workspace, part=(k, len(pieces)))
         for k, piece in enumerate(pieces, 1)
     ]
     arguments = ", ".join([*kernel.inputs, *(o.name for o in kernel.outputs), "work"])
@@ -51,6 +57,7 @@ def _definition(
     kernel: Kernel,
     name: str,
     code: Code,
+    functions: Mapping[str, str],
     *,
     exported: bool = False,
     workspace: int = 0,
@@ -58,7 +65,7 @@ def _definition(
 ) -> str:
     head = kernel.purpose if part[1] == 1 else f"{kernel.purpose} (part {part[0]} of {part[1]})"
     lines = [_comment(head), *_signature(program, kernel, name, exported=exported, workspace=workspace), "{"]
-    return "\n".join([*lines, *_body(program, kernel, code, workspace, exported=exported), "}"])
+    return "\n".join([*lines, *_body(program, kernel, code, functions, workspace, exported=exported), "}"])
 
 
 def _signature(program: Program, kernel: Kernel, name: str, *, exported: bool = False, workspace: int = 0) -> list[str]:
@@ -93,11 +100,13 @@ def wrapped_arguments(head: str, arguments: Sequence[str]) -> list[str]:
     return lines
 
 
-def _body(program: Program, kernel: Kernel, code: Code, workspace: int, *, exported: bool) -> list[str]:
+def _body(
+    program: Program, kernel: Kernel, code: Code, functions: Mapping[str, str], workspace: int, *, exported: bool
+) -> list[str]:
     arrays = [*kernel.inputs, *(o.name for o in kernel.outputs), "work"]
-    functions = {f"function:{f}": f"{program.name}_{f}" for f in SPECIAL}
-    scope = Scope({*C_RESERVED, *arrays, *functions.values()})
-    for f, name in functions.items():
+    special = {f"function:{f}": f"{program.name}_{f}" for f in SPECIAL}
+    scope = Scope({*C_RESERVED, *arrays, *special.values(), *functions.values()})
+    for f, name in special.items():
         scope.bind(f, name)
     member = members(program)
     lines: list[str] = []
@@ -117,7 +126,7 @@ def _body(program: Program, kernel: Kernel, code: Code, workspace: int, *, expor
                 lines.append(f"    const double {scope[s]} = {array}[{i}];")
     for k in range(workspace):
         scope.bind(f"w:{k}", f"work[{k}]")
-    show = printer(scope)
+    show = printer(scope, functions)
     for a in code.assignments:
         declare = "" if a.target.startswith("w:") else "const double "
         lines.append(f"    {declare}{scope[a.target]} = {show(a.value)};")
@@ -138,9 +147,9 @@ def apart(program: Program) -> str:
     return f"{program.name}_APART"
 
 
-def printer(scope: Scope) -> Printer:
+def printer(scope: Scope, functions: Mapping[str, str] = FUNCTIONS) -> Printer:
     """Prints lowered trees in C, with the names of a scope."""
-    return Printer(lambda n: scope[n], FUNCTIONS, CONSTANTS, "pow")
+    return Printer(lambda n: scope[n], functions, CONSTANTS, "pow")
 
 
 def members(program: Program) -> dict[str, str]:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Sequence
+from dataclasses import replace
 
+from phigen.scheme.alternation import Schedule
 from phigen.scheme.program import Kernel, Program
 from phigen.symbolic.expression import Expression
 from phigen.symbolic.special import SPECIAL
@@ -30,6 +32,7 @@ FUNCTIONS = {
     "abs": "np.abs",
     "power": "np.power",
     "sign": "np.sign({0})",
+    "versin": "(2.0 * np.sin(0.5 * ({0})) ** 2)",
 } | {
     name: f"np.{name}" for name in ["exp", "expm1", "log", "sin", "cos", "tan", "sinh", "cosh", "tanh", "sqrt", "cbrt"]
 }
@@ -56,17 +59,7 @@ def emit(program: Program, command: str) -> dict[str, str]:
     kernels = program.kernels
     pieces = [render("numpy", "preamble.py", _values(program))]
     pieces += [render("numpy", "phi.py", special.values(f, f"_{f}")) for f in special.used(program)]
-    pieces.append(_function(program, kernels["prepare"]))
-    if program.driver == "explicit":
-        pieces += [_function(program, kernels["explicit"]), render("numpy", "explicit.py", _values(program))]
-    elif program.path:
-        path = _values(program) | statements(program, program.path, PATH_SYNTAX)
-        pieces += [_function(program, kernels["generate"])]
-        parts = ("holds", "piece", "path", "residual", "solve", "path_step")
-        pieces += [render("numpy", f"{part}.py", path) for part in parts]
-    else:
-        pieces += [_function(program, kernels["linearise"]), render("numpy", "solve.py", _values(program))]
-        pieces += [render("numpy", "newton.py", _values(program))]
+    pieces += _driver(program)
     pieces.append(render("numpy", "gauge.py" if program.gauge else "no_gauge.py", _values(program)))
     pieces += [_function(program, kernels[k]) for k in ("guide", "products") if k in kernels]
     pieces += [render("numpy", "api.py", _values(program))]
@@ -82,10 +75,43 @@ def emit(program: Program, command: str) -> dict[str, str]:
     return {f"{program.name}.py": f"{comment}\n# {CHECKSUM} {checksum(body)}\n{body}"}
 
 
+def _driver(program: Program) -> list[str]:
+    """The functions that make a stage."""
+    kernels, values = program.kernels, _values(program)
+    if program.schedule:
+        row = _function(program, replace(kernels["prepare"], name="prepare_row"))
+        flows = [_function(program, kernel) for name, kernel in kernels.items() if name.startswith("flow")]
+        return [row, *flows, render("numpy", "splitting.py", values | _splitting_values(program, program.schedule))]
+    prepare = _function(program, kernels["prepare"])
+    if program.driver == "explicit":
+        return [prepare, _function(program, kernels["explicit"]), render("numpy", "explicit.py", values)]
+    if program.path:
+        path = values | statements(program, program.path, PATH_SYNTAX)
+        parts = ("holds", "piece", "path", "residual", "solve", "path_step")
+        generate = _function(program, kernels["generate"])
+        return [prepare, generate, *(render("numpy", f"{part}.py", path) for part in parts)]
+    linearise = _function(program, kernels["linearise"])
+    return [prepare, linearise, render("numpy", "solve.py", values), render("numpy", "newton.py", values)]
+
+
+def _splitting_values(program: Program, schedule: Schedule) -> dict[str, object]:
+    count = sum(name.startswith("flow") for name in program.kernels)
+    return {
+        "times": "(" + "".join(f"{t!r}, " for t in schedule.times).rstrip() + ")",
+        "row": program.coefficients // len(schedule.times),
+        "schedule": repr(tuple(schedule.flows)),
+        "flows": ", ".join(f"_flow{k}" for k in range(1, count + 1)),
+        "tangents": ", ".join(f"_tangent{k}" for k in range(1, count + 1)),
+    }
+
+
 def _tangent(program: Program) -> list[str]:
     """The tangent map of a step, with what it needs."""
     values, pieces = _values(program), []
-    if program.driver == "explicit":
+    if program.schedule:
+        values |= _splitting_values(program, program.schedule)
+        pieces += [_function(program, k) for name, k in program.kernels.items() if name.startswith("tangent")]
+    elif program.driver == "explicit":
         pieces += [_function(program, program.kernels["explicit_tangent"])]
     elif program.tangent_path:
         extended = tangent_program(program)
@@ -164,7 +190,7 @@ def _result(program: Program, kernel: Kernel, code: Code, printer: Printer) -> s
     values: dict[str, list[Expression]] = {o.name: [] for o in kernel.outputs}
     for s in code.stores:
         values[s.array].append(s.value)
-    if kernel.name == "prepare":
+    if kernel.outputs[0].name == "coef":
         return "    return " + _list([printer(v) for v in values["coef"]])
     state = next(a for a in kernel.inputs if a not in ("coef", "params", "gauge", "h"))
     n = program.dimension

@@ -1,0 +1,119 @@
+"""Splitting methods of any number of parts: compositions of χ_h = φ_m ∘ … ∘ φ_1 and its adjoint χ*_h = φ_1 ∘ … ∘ φ_m.
+
+Φ_h = χ_{α_2s h} ∘ χ*_{α_2s−1 h} ∘ … ∘ χ_{α_2 h} ∘ χ*_{α_1 h} with α_i = α_{2s+1−i} is a symmetric Poisson map if the
+φ_k are exact flows. Coefficients that give an order for two parts, a_1 = α_1, b_1 = α_1 + α_2, a_2 = α_2 + α_3, …, give
+it for any number: R. I. McLachlan, On the numerical integration of ordinary differential equations by symmetric
+composition methods, SIAM J. Sci. Comput. 16 (1995). Where χ and χ* meet, two flows of one part are one flow. Strang's
+splitting is α = (½, ½), and a symmetric composition of it has α = (γ_1/2, γ_1/2, γ_2/2, γ_2/2, …).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+
+from phigen.scheme.composition import COMPOSITIONS, Composition
+
+# S. Blanes, P. C. Moan, Practical symplectic partitioned Runge–Kutta and Runge–Kutta–Nyström methods, J. Comput. Appl.
+# Math. 142 (2002): the methods S_6 of order 4 and S_10 of order 6; the last a and b follow from Σa = Σb = 1.
+_S6 = ("0.0792036964311957 0.353172906049774 -0.0420650803577195", "0.209515106613362 -0.143851773179818")
+_S10 = (
+    "0.0502627644003922 0.413514300428344 0.0450798897943977 -0.188054853819569 0.541960678450780",
+    "0.148816447901042 -0.132385865767784 0.067307604692185 0.432666402578175",
+)
+
+
+@dataclass(frozen=True)
+class Alternation:
+    """A named method: α_1, …, α_2s, and the order that they give."""
+
+    name: str
+    order: int
+    fractions: tuple[Fraction, ...]
+
+    @property
+    def stages(self) -> int:
+        """s, the number of pairs of χ* and χ."""
+        return len(self.fractions) // 2
+
+
+def _partitioned(name: str, order: int, halves: tuple[str, str]) -> Alternation:
+    """α from a_1, …, and b_1, …, given up to the middle."""
+    a, b = ([Fraction(v) for v in half.split()] for half in halves)
+    a = [*a, 1 - 2 * sum(a, Fraction(0)), *reversed(a)]
+    rest = Fraction(1, 2) - sum(b, Fraction(0))
+    b = [*b, rest, rest, *reversed(b)]
+    times = [t for pair in zip(a, b, strict=False) for t in pair]
+    alpha = [times[0]]
+    for t in times[1:]:
+        alpha.append(t - alpha[-1])
+    return Alternation(name, order, tuple(alpha))
+
+
+def _composed(composition: Composition) -> Alternation:
+    halves = [Fraction(f) / 2 for f in composition.fractions for _ in range(2)]
+    return Alternation(composition.name, composition.order, tuple(halves))
+
+
+STRANG = Alternation("strang", 2, (Fraction(1, 2),) * 2)
+
+#: All methods, the recommended one of each order first.
+ALTERNATIONS = (
+    STRANG,
+    _partitioned("blanes-moan", 4, _S6),
+    _partitioned("blanes-moan", 6, _S10),
+    *(_composed(c) for c in COMPOSITIONS),
+)
+
+
+def find(name: str, order: int) -> Alternation | None:
+    """The method of that name (``auto``: the recommended one; ``none``: Strang's splitting) and order, or None."""
+    wanted = {"auto": [a.name for a in ALTERNATIONS], "none": [STRANG.name]}.get(name, [name])
+    return next((a for a in ALTERNATIONS if a.order == order and a.name in wanted), None)
+
+
+def orders(name: str) -> list[int]:
+    """The orders that a name offers."""
+    return sorted({a.order for a in ALTERNATIONS if find(name, a.order)})
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """The flows of one step: part 0 for ``times[0]``, then ``stages`` times the ``pattern``.
+
+    The pattern lists parts with the row of ``times`` that each takes, counted from the first row of the stage.
+    """
+
+    times: tuple[float, ...]
+    stages: int
+    pattern: tuple[tuple[int, int], ...]
+
+    @property
+    def rows(self) -> int:
+        """Rows of ``times`` in one stage."""
+        return (len(self.times) - 1) // self.stages if self.stages else 0
+
+    @property
+    def flows(self) -> list[tuple[int, int]]:
+        """All flows of a step in order: part and row of ``times``."""
+        later = [(part, 1 + k * self.rows + row) for k in range(self.stages) for part, row in self.pattern]
+        return [(0, 0), *later]
+
+
+def schedule(method: Alternation, parts: int) -> Schedule:
+    """The flows of a step of a method; one part alone is followed exactly."""
+    if parts == 1:
+        return Schedule((1.0,), 0, ())
+    alpha = [*method.fractions, Fraction(0)]
+    times: list[Fraction] = [alpha[0]]
+    for k in range(0, 2 * method.stages, 2):
+        early, late, after = alpha[k : k + 3]
+        stage: Sequence[Fraction] = (early, early + late, late, late + after)
+        times += stage if parts > 2 else (stage[1], stage[3])
+    last, middle = parts - 1, range(1, parts - 1)
+    if parts == 2:
+        pattern = [(1, 0), (0, 1)]
+    else:
+        pattern = [*((k, 0) for k in middle), (last, 1), *((k, 2) for k in reversed(middle)), (0, 3)]
+    return Schedule(tuple(float(t) for t in times), method.stages, tuple(pattern))

@@ -1,0 +1,115 @@
+"""The ring in which a Hamiltonian is taken apart: H, π and all derivatives as polynomials in one tower.
+
+A *variable* is a generator of the ring: a coordinate, a parameter, the time t, or a function value such as cos(q) or
+1/r. Those that do not depend on coordinates are *static*. Along the flow of a part G a variable that depends on
+coordinates is *frozen* if its derivative X_G(v) = Σ_j (π∇G)_j ∂_j v vanishes, else *moving*.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+from phigen.geometry.system import System
+from phigen.symbolic.expression import Expression, number, symbol
+from phigen.symbolic.horner import horner
+from phigen.symbolic.tower import Poly, Tower, rational
+
+#: The time of a flow, as a symbol: the step size of the solver.
+TIME = "h:"
+
+#: Exponents of some of the ring's variables.
+Monomial = tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Ring:
+    """A tower that holds a system, with its bracket."""
+
+    tower: Tower
+    coordinates: tuple[str, ...]
+    poisson: tuple[tuple[Poly, ...], ...]
+    hamiltonian: Poly
+
+    @cached_property
+    def state(self) -> tuple[int, ...]:
+        """The variables that depend on coordinates, as indices."""
+        tower = self.tower
+        return tuple(i for i, g in enumerate(tower.gens[: len(tower.names)]) if tower.depends_on(g, self.coordinates))
+
+    @cached_property
+    def values(self) -> list[Expression]:
+        """What each variable stands for."""
+        return [symbol(n) for n in self.tower.symbols] + [g.expression for g in self.tower.generators]
+
+    @cached_property
+    def zero_pairs(self) -> frozenset[tuple[int, int]]:
+        """The pairs of coordinates whose bracket is 0."""
+        n = len(self.coordinates)
+        return frozenset((i, j) for i in range(n) for j in range(n) if self.tower.is_zero(self.poisson[i][j]))
+
+    def support(self, element: Poly) -> tuple[int, ...]:
+        """The coordinates that an element depends on, directly or inside a function, as indices."""
+        return tuple(i for i, c in enumerate(self.coordinates) if self.tower.depends_on(element, [c]))
+
+    def field(self, g: Poly) -> list[Poly]:
+        """π∇g."""
+        slope = {i: self.tower.derivative(g, self.coordinates[i]) for i in self.support(g)}
+        return [
+            self.tower.combine(row[i] * d for i, d in slope.items() if (i, j) not in self.zero_pairs)
+            for j, row in enumerate(self.poisson)
+        ]
+
+    def rate(self, element: Poly, field: Sequence[Poly]) -> Poly:
+        """The derivative of an element along a vector field; 0 as a polynomial if it vanishes."""
+        found = self.tower.combine(
+            field[j] * self.tower.derivative(element, c)
+            for j, c in enumerate(self.coordinates)
+            if field[j] != 0 and self.tower.depends_on(element, [c])
+        )
+        return self.tower.zero if self.tower.is_zero(found) else found
+
+    def commute(self, f: Poly, g: Poly) -> bool:
+        """Whether {f, g} = 0, proved."""
+        if all((i, j) in self.zero_pairs for i in self.support(f) for j in self.support(g)):
+            return True
+        return bool(self.rate(f, self.field(g)) == 0)
+
+    def terms(self, element: Poly, variables: Collection[int]) -> dict[Monomial, Poly]:
+        """The element as a polynomial in some of the ring's variables, its coefficients in the others."""
+        groups: dict[Monomial, dict[Monomial, Any]] = {}
+        for m, c in element.to_dict().items():
+            key = tuple(int(e) if i in variables else 0 for i, e in enumerate(m))
+            rest = tuple(0 if i in variables else int(e) for i, e in enumerate(m))
+            groups.setdefault(key, {})[rest] = c
+        return {m: self.tower.context.from_dict(part) for m, part in groups.items()}
+
+    def monomial(self, exponents: Monomial) -> Poly:
+        """The product of powers of the ring's variables."""
+        return self.tower.context.from_dict({exponents: 1})
+
+    def expression(self, element: Poly) -> Expression:
+        """The element as an expression in which static factors are collected, to be computed before the steps."""
+        names = len(self.tower.names)
+        state = set(self.state)
+        static = [i for i in range(names) if i not in state]
+        groups: dict[Monomial, dict[Monomial, Expression]] = {}
+        for m, c in element.to_dict().items():
+            key = tuple(int(m[i]) for i in self.state)
+            groups.setdefault(key, {})[tuple(int(m[i]) for i in static)] = number(rational(c))
+        fixed = [self.values[i] for i in static]
+        collected = {key: horner(part, fixed) for key, part in sorted(groups.items())}
+        return horner(collected, [self.values[i] for i in self.state])
+
+
+def ring_of(system: System, more: Iterable[Expression] = ()) -> Ring:
+    """The ring of a system, with the time and whatever else occurs in the expressions ``more``."""
+    listed = list(more)
+    roots = [system.hamiltonian, *listed, *(e for row in system.poisson for e in row)]
+    tower = Tower([*system.coordinates, *system.parameter_names, TIME], roots, system.coordinates)
+    images = tower.convert_all(roots)
+    n, start = system.dimension, 1 + len(listed)
+    poisson = tuple(tuple(images[start + i * n : start + (i + 1) * n]) for i in range(n))
+    return Ring(tower, system.coordinates, poisson, images[0])

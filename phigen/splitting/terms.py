@@ -1,0 +1,54 @@
+"""The terms of H: sums taken apart as they were written, and products expanded where they mix what does not commute."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator
+
+from phigen.geometry.system import System
+from phigen.splitting.flow import Term
+from phigen.splitting.ring import Ring
+from phigen.symbolic.expression import ONE, Expression, neg, symbols_of, total
+
+
+def summands(e: Expression, coordinates: Collection[str], factor: Expression = ONE) -> Iterator[Expression]:
+    """The terms of a sum, nested sums and constant factors of sums resolved."""
+    if e.op in ("add", "sub"):
+        yield from summands(e.args[0], coordinates, factor)
+        yield from summands(e.args[1], coordinates, factor if e.op == "add" else neg(factor))
+    elif e.op == "neg":
+        yield from summands(e.args[0], coordinates, neg(factor))
+    elif e.op == "mul" and any(_static(a, coordinates) for a in e.args):
+        constant, rest = e.args if _static(e.args[0], coordinates) else e.args[::-1]
+        yield from summands(rest, coordinates, constant * factor)
+    else:
+        yield factor * e
+
+
+def _static(e: Expression, coordinates: Collection[str]) -> bool:
+    return not any(s in coordinates for s in symbols_of(e))
+
+
+def terms_of(ring: Ring, listed: list[Expression]) -> list[Term]:
+    """The terms of H, those of the same coordinates together; a constant is left out.
+
+    A summand of coordinates that do not commute is expanded in the ring, and its monomials are separate terms.
+    """
+    groups: dict[tuple[int, ...], list[Term]] = {}
+    for e in listed:
+        element = ring.tower.convert(e)
+        support = ring.support(element)
+        if all((i, j) in ring.zero_pairs for i in support for j in support):
+            groups.setdefault(support, []).append(Term(e, element))
+            continue
+        for monomial, coefficient in ring.terms(element, ring.state).items():
+            part = coefficient * ring.monomial(monomial)
+            groups.setdefault(ring.support(part), []).append(Term(ring.expression(part), part))
+    groups.pop((), None)
+    return [
+        Term(total(t.expression for t in part), ring.tower.combine(t.element for t in part)) for part in groups.values()
+    ]
+
+
+def hamiltonian_terms(system: System) -> list[Expression]:
+    """The summands of H."""
+    return list(summands(system.hamiltonian, system.coordinates))

@@ -1,0 +1,87 @@
+"""The step of a splitting in C: one function for each flow, and the schedule that calls them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+from phigen.scheme.alternation import Schedule
+from phigen.scheme.program import Kernel, Output, Program
+from phigen.symbolic.expression import topological
+from phigen.targets.c.kernels import FUNCTIONS, function
+from phigen.targets.rendering import render
+
+#: Functions of small arguments with a template of their own: flows live on them, and libm's are slow there.
+SMALL = ("expm1", "sin", "versin")
+
+
+def pieces(program: Program, values: Mapping[str, object]) -> list[str]:
+    """The functions of the driver."""
+    kernels, schedule, own = program.kernels, schedule_of(program), {**values, **_values(program)}
+    used = {e.op for k in _flows(program) for e in topological(kernels[k].roots)}
+    found = [render("c", f"small_{f}.c", values) for f in SMALL if f in used]
+    functions = FUNCTIONS | {f: f"{program.name}_{f}" for f in SMALL}
+    found += [function(program, replace(kernels["prepare"], name="prepare_row")) + "\n", render("c", "add.c", values)]
+    for k, name in enumerate(_flows(program), 1):
+        kernel, moved = _compact(kernels[name], k)
+        found.append(function(program, kernel, functions=functions) + "\n")
+        found.append(
+            render("c", "flow.c", own | {"k": k, "moved": list(enumerate(moved)), "count": max(1, len(moved))})
+        )
+    return [*found, render("c", "splitting.c", own | {"step": _step(program, schedule)})]
+
+
+def tangent(program: Program, values: Mapping[str, object]) -> list[str]:
+    """The derivative of a step."""
+    found = [function(program, program.kernels[f"tangent{k}"]) + "\n" for k, _ in enumerate(_flows(program), 1)]
+    flows, count = schedule_of(program).flows, len(_flows(program))
+    own = {
+        **values,
+        **_values(program),
+        "flows": len(flows),
+        "parts": [*((f"case {k}", k) for k in range(1, count)), ("default", count)],
+        "part_of": ", ".join(str(part + 1) for part, _ in flows),
+        "row_of": ", ".join(str(row) for _, row in flows),
+    }
+    return [*found, render("c", "tangent_splitting.c", own)]
+
+
+def schedule_of(program: Program) -> Schedule:
+    """The schedule of a splitting."""
+    if program.schedule is None:
+        raise ValueError(f"{program.name} is no splitting")
+    return program.schedule
+
+
+def _flows(program: Program) -> list[str]:
+    return [name for name in program.kernels if name.startswith("flow")]
+
+
+def _values(program: Program) -> dict[str, object]:
+    times = schedule_of(program).times
+    return {
+        "rows": len(times),
+        "times": ", ".join(repr(t) for t in times),
+        "row": max(1, program.coefficients // len(times)),
+    }
+
+
+def _compact(kernel: Kernel, k: int) -> tuple[Kernel, list[int]]:
+    """The kernel without the zero increments, and the coordinates that move."""
+    values = kernel.roots
+    moved = [i for i, e in enumerate(values) if not e.is_zero]
+    output = Output("change", tuple(values[i] for i in moved))
+    return replace(kernel, name=f"change{k}", outputs=(output,)), moved
+
+
+def _step(program: Program, schedule: Schedule) -> list[str]:
+    """The calls of a step."""
+    name, row = program.name, _values(program)["row"]
+    lines = [f"{name}_flow1(coef, x, carry);"]
+    if schedule.stages:
+        lines += [f"coef += {row};", f"for (int k = 0; k < {schedule.stages}; ++k) {{"]
+        for part, at in schedule.pattern:
+            place = f"coef + {at} * {row}" if at else "coef"
+            lines.append(f"    {name}_flow{part + 1}({place}, x, carry);")
+        lines += [f"    coef += {schedule.rows} * {row};", "}"]
+    return lines

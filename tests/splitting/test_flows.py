@@ -1,0 +1,97 @@
+"""Flows of parts of H: found in closed form, and proved; what has none is refused by name."""
+
+from dataclasses import replace
+
+import pytest
+from support import compile_text
+
+from phigen.errors import SpecError
+from phigen.splitting.statements import check
+from phigen.symbolic.verdict import PROVED, REFUTED
+
+BODY = "coordinates: [x, y, z]\npoisson: {brackets: {x: {y: -z, z: y}, y: {z: -x}}}\n"
+PLANE = "coordinates: [q, p]\npoisson: {canonical: {q: [q], p: [p]}}\n"
+
+#: A system, and how its coordinates move along the flows of the parts.
+SYSTEMS = {
+    "kick and drift": (PLANE + "hamiltonian: p**2/2 + p**4 - cos(q)", ["p shifted", "q shifted"]),
+    "a part that does not move": (PLANE + "hamiltonian: p**2/2", ["q shifted"]),
+    "degenerate and constant": (
+        "coordinates: [x, y, z]\npoisson: {matrix: [[0, 1, 2], [-1, 0, 0], [-2, 0, 0]]}\n"
+        "hamiltonian: x**2 + y*z + z**3",
+        ["x shifted", "y, z shifted"],
+    ),
+    "rotations": (BODY + "hamiltonian: x**2 + 2*y**2 + z**4", ["x, y turned", "x, z turned", "y, z turned"]),
+    "angular velocity with a parameter": (
+        BODY + "parameters: {I: 2}\nhamiltonian: x**2/I + sqrt(1 + y**2)",
+        ["x, z turned", "y, z turned"],
+    ),
+    "hyperbolic rotations": (
+        "coordinates: [x, y, z]\npoisson: {brackets: {x: {y: z, z: y}, y: {z: x}}}\nhamiltonian: x**2 + y**2 + z",
+        None,
+    ),
+    "shears of the Heisenberg algebra": (
+        "coordinates: [x, y, z]\npoisson: {lie_algebra: {name: heisenberg(1)}}\nhamiltonian: x**2 + y**2 + z*x",
+        None,
+    ),
+    "scalings": (
+        "coordinates: [x, y, z]\npoisson: {log_canonical: [[0, 1, 2], [-1, 0, -3], [-2, 3, 0]]}\n"
+        "hamiltonian: x - log(x) + y**2 + exp(z)",
+        ["x, y scaled", "x, z scaled", "y, z scaled"],
+    ),
+    "affine": (
+        "coordinates: [x, y]\nparameters: {b: 2}\npoisson: {brackets: {x: {y: x + b}}}\nhamiltonian: x**2 + y**2",
+        None,
+    ),
+    "a field that depends on the place": (
+        "coordinates: [x, y, u, v]\npoisson: {brackets: {x: {u: 1}, y: {v: 1}, u: {v: 1 + x**2 + y**2}}}\n"
+        "hamiltonian: (u**2 + v**2)/2 + x**4",
+        ["y, u moved by a polynomial in t", "x, v moved by a polynomial in t"],
+    ),
+}
+
+
+@pytest.mark.parametrize(("text", "manners"), SYSTEMS.values(), ids=SYSTEMS)
+def test_flows_are_proved(text, manners):
+    compilation = compile_text(text + "\n", scheme="splitting")
+    statements = list(check(compilation.system, compilation.splitting))
+    assert {s.verdict for s in statements} == {PROVED}, [str(s) for s in statements]
+    if manners is not None:
+        assert sorted(f.manner for f in compilation.splitting.flows) == sorted(manners)
+
+
+@pytest.mark.parametrize(("text", "manners"), SYSTEMS.values(), ids=SYSTEMS)
+def test_a_wrong_sign_in_one_flow_is_refuted(text, manners):
+    compilation = compile_text(text + "\n", scheme="splitting")
+    flows = compilation.splitting.flows
+    for k, flow in enumerate(flows):
+        moved = next(i for i, e in enumerate(flow.increment) if not e.is_zero)
+        wrong = tuple(-e if i == moved else e for i, e in enumerate(flow.increment))
+        planted = replace(compilation.splitting, flows=(*flows[:k], replace(flow, increment=wrong), *flows[k + 1 :]))
+        verdicts = [s.verdict for s in check(compilation.system, planted)]
+        assert [i for i, v in enumerate(verdicts) if v == REFUTED] == [k + 1]
+
+
+def test_a_part_left_out_is_refuted():
+    compilation = compile_text(BODY + "hamiltonian: x**2 + 2*y**2 + z**4\n", scheme="splitting")
+    planted = replace(compilation.splitting, flows=compilation.splitting.flows[1:])
+    assert next(iter(check(compilation.system, planted))).verdict == REFUTED
+
+
+REFUSED = {
+    "q and p multiplied": (PLANE + "hamiltonian: p**2/2 + q**2*p**3", "q**2*p**3"),
+    "elliptic functions": (
+        "coordinates: [x, y, z]\npoisson: {brackets: {x: {y: z*z, z: x*y}, y: {z: x*x}}}\nhamiltonian: x",
+        "the term x ",
+    ),
+}
+
+
+@pytest.mark.parametrize(("text", "named"), REFUSED.values(), ids=REFUSED)
+def test_what_has_no_elementary_flow_is_refused_by_name_and_place(text, named):
+    with pytest.raises(SpecError) as caught:
+        compile_text(text + "\n", scheme="splitting")
+    (diagnostic,) = caught.value.diagnostics
+    assert named in diagnostic.message
+    assert "elementary flow" in diagnostic.message
+    assert (diagnostic.location.line, diagnostic.hint != "") == (5, True)

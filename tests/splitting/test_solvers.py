@@ -1,0 +1,132 @@
+"""Generated solvers of splittings: orders, Casimirs, the Poisson identity, reversibility, failing steps."""
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from support import TARGETS, compile_text, compiled, setting, solver
+
+from phigen.analysis import measures
+from phigen.analysis.methods import of_solver
+from phigen.analysis.proof import examine
+from phigen.analysis.verification import verify
+from phigen.errors import CheckError, StepError
+from phigen.scheme.alternation import find
+from phigen.scheme.splitting import build_splitting
+from phigen.spec.model import Extras
+
+SYSTEMS = ["rigid_body", "kowalevski_top", "lotka_volterra", "toda3", "henon_heiles", "charged_particle"]
+TANGENT = Extras(tangent=True)
+
+PLANE = "coordinates: [q, p]\npoisson: {canonical: {q: [q], p: [p]}}\n"
+ROD = PLANE + "parameters: {g: 1}\nhamiltonian: p**2/2 - g*cos(q)\n"
+
+
+def splitting_of(name, order):
+    """The solver of a system of the corpus as a splitting, with its tangent map."""
+    found = compiled(name, order, "splitting")
+    method = find("auto", order)
+    program = build_splitting(found.system, found.splitting, found.order, method, found.gauge, extras=TANGENT)
+    return replace(found, program=program)
+
+
+#: Times over which errors are between those of rounding and 1.
+SPANS = {"rigid_body": 6, "kowalevski_top": 6, "predator_prey": 12, "toda3": 6, "charged_particle": 2}
+
+
+@pytest.mark.parametrize("name", SPANS)
+@pytest.mark.parametrize("order", [2, 4, 6, 8, 10])
+def test_observed_order_is_the_stated_one(name, order):
+    found, at = compiled(name, order, "splitting"), setting(compiled(name))
+    solve = solver(found, "c")
+    span, reference = SPANS[name], solver(compiled(name, 8, "splitting"), "c")
+    fine = reference.integrate(at.x, span / 1024, 1024, parameters=at.parameters).x[-1]
+
+    def error(steps):
+        end = solve.integrate(at.x, span / steps, steps, parameters=at.parameters).x[-1]
+        return np.max(np.abs(end - fine)) / np.max(np.abs(fine))
+
+    errors = [error(n) for n in (4, 8, 16, 32, 64, 128)]
+    slopes = [np.log2(a / b) for a, b in pairwise(errors) if a < 1e-2 and b > 1e-13]
+    assert slopes, "the test needs another time"
+    assert max(slopes) > order - 0.3
+
+
+@pytest.mark.parametrize("name", SYSTEMS)
+def test_step_is_a_reversible_poisson_map_that_keeps_casimirs_in_both_targets(name):
+    found, at = splitting_of(name, 4), setting(compiled(name))
+    images = []
+    for target in TARGETS:
+        method = of_solver(solver(found, target), at.parameters, None)
+        x = np.array(at.x)
+        assert measures.poisson_defect(found.system, at.parameters, method, x, at.h) < 1e-14
+        assert measures.tangent_error(method, x, at.h) < 1e-8
+        assert measures.reversal(method, x, at.h) < 1e-14
+        run = solver(found, target).integrate(x, at.h, 500, parameters=at.parameters)
+        for values in run.casimirs.values():
+            assert np.ptp(values) <= 2e-14 * max(1, np.max(np.abs(values)))
+        images.append(run.x[20])
+    assert np.max(np.abs(images[0] - images[1])) < 1e-14 * np.max(np.abs(images[0]))
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_step_size_and_parameters_are_those_of_the_call(target):
+    solve = solver(compile_text(ROD, 4, "splitting"), target)
+    there = solve.step([1.0, 0.5], 0.3, g=2.0)
+    assert solve.step(there, -0.3, g=2.0) == pytest.approx([1.0, 0.5], abs=1e-15)
+    assert np.max(np.abs(solve.step([1.0, 0.5], 0.3) - there)) > 1e-2
+    many = solve.ensemble([[1.0, 0.5], [0.0, 2.0]], 0.3, 7, g=2.0)
+    alone = [solve.integrate(x, 0.3, 7, g=2.0).x[-1] for x in ([1.0, 0.5], [0.0, 2.0])]
+    assert np.array_equal(many, alone)
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_a_step_that_leaves_the_numbers_fails_and_the_state_before_it_stands(target):
+    text = "coordinates: [q, p]\npoisson: {canonical: {q: [q], p: [p]}}\nhamiltonian: p**2/2 - exp(q)\n"
+    solve = solver(compile_text(text, 4, "splitting"), target)
+    with pytest.raises(StepError) as caught:
+        solve.integrate([0.0, 1.0], 0.5, 100)
+    assert caught.value.status == "NOT_FINITE"
+    assert len(caught.value.trajectory) == caught.value.step + 1
+    assert np.isfinite(caught.value.trajectory.x).all()
+
+
+def test_exact_flow_is_followed_in_one_piece():
+    text = "coordinates: [x, y, z]\npoisson: {brackets: {x: {y: -z, z: y}, y: {z: -x}}}\nhamiltonian: x**2\n"
+    found = compile_text(text, 2, "splitting")
+    assert [len(found.splitting.flows), len(found.program.schedule.flows)] == [1, 1]
+    x = solver(found, "c").step([0.3, 0.4, 1.2], 7.0)
+    turned = 0.4 * np.cos(4.2) + 1.2 * np.sin(4.2)
+    assert x[:2] == pytest.approx([0.3, turned], abs=1e-15)
+
+
+def test_a_wrong_sign_in_one_flow_falls_short_of_the_order():
+    found, at = compiled("kowalevski_top", 4, "splitting"), setting(compiled("kowalevski_top"))
+    flow = found.splitting.flows[0]
+    wrong = replace(flow, increment=tuple(-e for e in flow.increment))
+    planted = replace(found.splitting, flows=(wrong, *found.splitting.flows[1:]))
+    method = find("auto", 4)
+    program = build_splitting(found.system, planted, found.order, method, found.gauge, extras=TANGENT)
+    bad = replace(found, program=program, splitting=planted)
+    solvers = {target: solver(bad, target) for target in TARGETS}
+    verified = verify(bad, solvers, "planted", at.x, at.parameters, at.h, 100, quick=True)
+    assert any(f.startswith("observed order") for f in verified.failures)
+
+
+def test_refuted_flows_are_not_compiled(monkeypatch):
+    from phigen.analysis import proof
+    from phigen.splitting import statements
+
+    genuine = statements.check
+    found = compiled("rigid_body", 4, "splitting")
+
+    def planted(system, splitting):
+        flow = splitting.flows[1]
+        wrong = replace(flow, increment=tuple(-e for e in flow.increment))
+        return genuine(system, replace(splitting, flows=(splitting.flows[0], wrong, *splitting.flows[2:])))
+
+    monkeypatch.setattr(statements, "check", planted)
+    assert [s.name[:19] for s in examine(found.spec, scheme="splitting").refuted] == ["the flow Φ of H_2: "]
+    with pytest.raises(CheckError, match="H_2"):
+        proof.compile_proved(found.spec, scheme="splitting")
