@@ -247,7 +247,21 @@ def _value(e: Expression, args: list[Any], at: Mapping[str, Any]) -> Any:
             return 1 - mpmath.cos(args[0])
         case "phi0" | "phi1" | "phi2":
             return _phi(int(e.op[3:]), args[0])
+        case "cosroot" | "sinroot" | "sinroot1" | "exprel" | "exprel1":
+            return _entire(e.op, args[0])
     return getattr(mpmath, e.op)(*args)
+
+
+def _entire(name: str, s: Any) -> Any:
+    """cos √s, sin(√s)/√s, (e^s − 1)/s or a derivative, by complex arithmetic: one formula for s of either sign."""
+
+    def closed(z: Any) -> Any:
+        root = mpmath.sqrt(z)
+        if name.startswith("exprel"):
+            return (mpmath.exp(z) - 1) / z
+        return mpmath.cos(root) if name == "cosroot" else mpmath.sin(root) / root
+
+    return mpmath.re(mpmath.diff(closed, mpmath.mpc(s)) if name.endswith("1") else closed(mpmath.mpc(s)))
 
 
 def _phi(order: int, s: Any) -> Any:

@@ -16,6 +16,7 @@ from itertools import pairwise
 from typing import Any
 
 from phigen.analysis.formulas import Formula
+from phigen.symbolic.entire import ENTIRE
 from phigen.symbolic.expression import Expression, fold, natural_key
 
 #: Characters of markup beyond which a part of a formula is left out; what is shared should have a name by then.
@@ -199,9 +200,29 @@ def _visit(node: Expression, args: list[Sum]) -> Sum:
             return (*_called("exp", args), Term(Fraction(-1)))
         case "versin":
             return (Term(Fraction(1)), *_negated(_called("cos", args)))
+        case op if op in ENTIRE:
+            return _entire(op, args[0])
         case "abs":
             return _one(Factor(_row(f"<mo>|</mo>{summed(args[0])}<mo>|</mo>")))
     return _called(node.op, args)
+
+
+def _entire(name: str, s: Sum) -> Sum:
+    """A function of `ENTIRE`, as its closed form for s > 0."""
+    root, inverse = _power(s, Fraction(1, 2)), _power(s, Fraction(-1))
+    cos, sin = _called("cos", [root]), _times(_called("sin", [root]), _power(s, Fraction(-1, 2)))
+    exp = _one(Factor("<mi>e</mi>").power(summed(s)))
+    relative = _times((*exp, Term(Fraction(-1))), inverse)
+    match name:
+        case "cosroot":
+            return cos
+        case "sinroot":
+            return sin
+        case "sinroot1":
+            return _times((Term(Fraction(1, 2)),), cos + _negated(sin), inverse)
+        case "exprel":
+            return relative
+    return _times(exp + _negated(relative), inverse)
 
 
 def _called(function: str, args: Sequence[Sum]) -> Sum:

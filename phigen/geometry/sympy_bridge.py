@@ -14,9 +14,11 @@ import sympy
 from phigen.errors import Diagnostic, SpecError
 from phigen.geometry.system import System, build_system
 from phigen.spec.model import MatrixForm, Parameter
+from phigen.symbolic.entire import ENTIRE
 from phigen.symbolic.expression import (
     EULER,
     FUNCTIONS,
+    OWN,
     PI,
     Expression,
     call,
@@ -72,7 +74,7 @@ def _node(e: Any, args: list[Expression]) -> Expression:
         return power(args[0], args[1])
     name = type(e).__name__
     name = _FROM_SYMPY.get(name, name)
-    if FUNCTIONS.get(name) == len(args) and name not in ("power", "expm1", "versin", *SPECIAL):
+    if FUNCTIONS.get(name) == len(args) and (name == "sign" or name not in OWN):
         return call(name, *args)
     raise SpecError([Diagnostic(f"{e} has no counterpart in phigen", hint=f"known functions: {', '.join(FUNCTIONS)}")])
 
@@ -106,11 +108,21 @@ def to_sympy(e: Expression) -> Any:
             return sympy.exp(args[0]) - 1
         if node.op == "versin":
             return 1 - sympy.cos(args[0])
+        if node.op in ENTIRE:
+            return _entire(node.op, *args)
         if node.op in SPECIAL:
             return sympy.Function(r"\varphi" + "'" * order_of(node.op))(*args)
         return getattr(sympy, _TO_SYMPY.get(node.op, node.op))(*args)
 
     return fold([e], visit)[0]
+
+
+def _entire(name: str, s: Any) -> Any:
+    """A function of `ENTIRE`, as its closed form for s > 0."""
+    root = sympy.sqrt(s)
+    cos, sin, relative = sympy.cos(root), sympy.sin(root) / root, (sympy.exp(s) - 1) / s
+    closed = {"cosroot": cos, "sinroot": sin, "sinroot1": (cos - sin) / (2 * s)}
+    return (closed | {"exprel": relative, "exprel1": (sympy.exp(s) - relative) / s})[name]
 
 
 def system(

@@ -5,12 +5,10 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 
-from phigen.symbolic.expression import FUNCTIONS
-from phigen.symbolic.special import SPECIAL
+from phigen.symbolic.expression import FUNCTIONS, OWN
 
-#: Functions of expressions with their number of arguments; ``sign``, ``power`` and φ are phigen's own.
-_OWN = ("sign", "power", "expm1", "versin", *SPECIAL)
-SPEC_FUNCTIONS: dict[str, int] = {"sqrt": 1} | {f: n for f, n in FUNCTIONS.items() if f not in _OWN}
+#: Functions of expressions with their number of arguments.
+SPEC_FUNCTIONS: dict[str, int] = {"sqrt": 1} | {f: n for f, n in FUNCTIONS.items() if f not in OWN}
 
 SPEC_NAME = r"[a-z][a-z0-9_]{0,30}"
 IDENTIFIER = r"[A-Za-z_][A-Za-z0-9_]*"

@@ -3,9 +3,11 @@
 The closed forms rest on the relation that the powers of A satisfy; A commutes with its entries, which are constant:
 
 - A^k = 0: a polynomial in t
-- A² = dA: (e^{td} − 1) A/d, without cancellation
-- A³ = −e²A: sin(te) A/e + (1 − cos(te)) A²/e²
-- A³ = e²A: 2s(c A/e + s A²/e²) with s = sinh(te/2), c = cosh(te/2)
+- A^{a+1} = dA^a: Σ_{k<a} (tA)^k/k! and (e^{td} − …) A^a/d^a, the part of the exponential series from (td)^a on
+- A^{a+2} = −cA^a: the same with sin and cos of t√c, or with sinh and cosh, for a = 1 and a = 2
+
+Where A^a/d^a is not in the ring, as when d depends on the state and A/d would be 0/0 where d vanishes, the functions of
+`phigen.symbolic.entire` take the place of the quotients; they do not care about the sign of c either.
 """
 
 from __future__ import annotations
@@ -16,10 +18,12 @@ from fractions import Fraction
 
 from phigen.splitting.closure import LinearMotion
 from phigen.splitting.ring import TIME, Ring
-from phigen.symbolic.expression import Expression, call, number, sqrt
+from phigen.symbolic.expression import Expression, call, number, sqrt, symbol
 from phigen.symbolic.tower import Poly, rational
 
 Matrix = Sequence[Sequence[Poly]]
+
+_HALF = number(Fraction(1, 2))
 
 
 class NoClosedFormError(Exception):
@@ -36,67 +40,117 @@ class Solution:
 
 def solve(ring: Ring, motion: LinearMotion) -> Solution:
     """exp(tA)w − w for the coordinates of the motion. Raises `NoClosedFormError`."""
-    a, n = motion.matrix, len(motion.coordinates)
     w = [ring.monomial(m) for m in motion.basis]
     if len(w) == 1:
-        growth = ring.expression(a[0][0] * ring.tower.variable(TIME))
+        growth = ring.expression(motion.matrix[0][0] * ring.tower.variable(TIME))
         return Solution((ring.expression(w[0]) * call("expm1", growth),), "scaled")
-    powers = [a, _product(ring, a, a)]
-    found = _nilpotent(ring, powers, w)
+    powers = _powers(ring, motion.matrix)
+    images = [_image(ring, power, w) for power in powers]
+    found = _nilpotent(ring, powers, images)
+    for a in (1, 2):
+        found = found or _scaling(ring, powers, images, a) or _turning(ring, powers, images, a)
     if found is None:
-        found = _scaling(ring, powers, w) or _turning(ring, powers, w)
-    if found is None:
-        raise NoClosedFormError(
-            f"exp(tA) for a {len(w)}×{len(w)} matrix A that satisfies neither A^k = 0 nor A² = dA nor A³ = -cA"
-        )
-    return Solution(found.increments[:n], found.manner)
+        size = f"{len(w)}×{len(w)}"
+        raise NoClosedFormError(f"exp(tA) with a {size} matrix A whose powers satisfy no relation that phigen can use")
+    return Solution(found.increments[: len(motion.coordinates)], found.manner)
 
 
-def _nilpotent(ring: Ring, powers: list[Matrix], w: Sequence[Poly]) -> Solution | None:
-    """Σ t^k A^k w/k!, if some power of A vanishes. Powers that were needed are kept in the list."""
-    tower, t = ring.tower, ring.tower.variable(TIME)
-    total, power, factorial = [tower.zero] * len(w), powers[0], 1
-    for k in range(1, len(w) + 1):
+def _powers(ring: Ring, a: Matrix) -> list[Matrix]:
+    """A, A², …, up to the first power that vanishes, or the size of A, or A⁴ if that is more."""
+    powers = [a]
+    while len(powers) < max(4, len(a)) and not _vanishes(powers[-1]):
+        powers.append(_product(ring, powers[-1], a))
+    return powers
+
+
+def _nilpotent(ring: Ring, powers: Sequence[Matrix], images: Sequence[Sequence[Poly]]) -> Solution | None:
+    """Σ t^k A^k w/k!, if some power of A vanishes."""
+    if not _vanishes(powers[-1]):
+        return None
+    tower, t, factorial = ring.tower, ring.tower.variable(TIME), 1
+    total = [tower.zero] * len(images[0])
+    for k, image in enumerate(images[:-1], 1):
         factorial *= k
         scale = t**k * tower.constant(Fraction(1, factorial))
-        total = [tower.combine([s, scale * image]) for s, image in zip(total, _image(ring, power, w), strict=True)]
-        power = powers[k] if k < len(powers) else _product(ring, power, powers[0])
-        if all(e == 0 for row in power for e in row):
-            manner = "shifted" if k == 1 else "moved by a polynomial in t"
-            return Solution(tuple(ring.expression(s) for s in total), manner)
-        if k == 3 and len(powers) == 2:
-            powers.append(power)
-    return None
+        total = [tower.combine([s, scale * v]) for s, v in zip(total, image, strict=True)]
+    manner = "shifted" if len(images) == 2 else "moved by a polynomial in t"
+    return Solution(tuple(ring.expression(s) for s in total), manner)
 
 
-def _scaling(ring: Ring, powers: list[Matrix], w: Sequence[Poly]) -> Solution | None:
-    """(e^{td} − 1) (A/d) w, if A² = dA."""
-    d = _ratio(ring, powers[1], powers[0])
+def _scaling(ring: Ring, powers: Sequence[Matrix], images: Sequence[Sequence[Poly]], a: int) -> Solution | None:
+    """If A^{a+1} = dA^a."""
+    d = _ratio(ring, powers[a], powers[a - 1])
     if d is None:
         return None
-    directed = [_quotient(ring, image, d) for image in _image(ring, powers[0], w)]
-    growth = call("expm1", ring.expression(d * ring.tower.variable(TIME)))
-    return Solution(tuple(growth * _settled(ring, e) for e in directed), "scaled")
-
-
-def _turning(ring: Ring, powers: list[Matrix], w: Sequence[Poly]) -> Solution | None:
-    """sin(te) (A/e)w + (1 − cos te) (A/e)²w, if A³ = −e²A; the hyperbolic functions, if A³ = e²A."""
-    cube = powers[2] if len(powers) > 2 else _product(ring, powers[1], powers[0])
-    c = _ratio(ring, cube, powers[0])
-    root = None if c is None else _root(ring, c)
-    if root is None:
+    t, exponent = symbol(TIME), ring.expression(d * ring.tower.variable(TIME))
+    directed = _quotients(ring, images[a - 1], d**a)
+    if directed is not None:
+        growth = call("expm1", exponent)
+        if a == 1:
+            return Solution(tuple(growth * v for v in directed), "scaled")
+        first = [ring.expression(v) for v in images[0]]
+        return Solution(
+            tuple(t * u + (growth - exponent) * v for u, v in zip(first, directed, strict=True)), "scaled and shifted"
+        )
+    if a == 2:
         return None
-    turns, content, e = root
-    scale = sqrt(number(content))
-    angle = scale * ring.expression(e * ring.tower.variable(TIME))
-    first = [_settled(ring, _quotient(ring, v, e)) / scale for v in _image(ring, powers[0], w)]
-    second = [_settled(ring, _quotient(ring, v, e * e)) / number(content) for v in _image(ring, powers[1], w)]
-    if turns:
-        sine, rest = call("sin", angle), call("versin", angle)
-        return Solution(tuple(sine * a + rest * b for a, b in zip(first, second, strict=True)), "turned")
-    s, c = (call(f, angle / 2) for f in ("sinh", "cosh"))
-    increments = tuple(2 * s * (c * a + s * b) for a, b in zip(first, second, strict=True))
-    return Solution(increments, "moved along hyperbolas")
+    growth = t * call("exprel", exponent)
+    return Solution(tuple(growth * ring.expression(v) for v in images[0]), "scaled")
+
+
+def _turning(ring: Ring, powers: Sequence[Matrix], images: Sequence[Sequence[Poly]], a: int) -> Solution | None:
+    """If A^{a+2} = −cA^a."""
+    c = None if len(powers) < a + 2 else _ratio(ring, powers[a + 1], powers[a - 1])
+    if c is None:
+        return None
+    root = _root(ring, -c)
+    e = None if root is None else root.element
+    directed = None if e is None else _quotients(ring, images[a - 1], e**a)
+    further = None if e is None else _quotients(ring, images[a], e ** (a + 1))
+    if root is not None and directed is not None and further is not None:
+        angle = root.scale * ring.expression(root.element * ring.tower.variable(TIME))
+        units = [[v / root.scale**k for v in listed] for k, listed in ((a, directed), (a + 1, further))]
+        first = [ring.expression(v) for v in images[0]]
+        return _circular(first, units, angle, a) if root.positive else _hyperbolic(first, units, angle, a)
+    if a == 2:
+        return None
+    t = symbol(TIME)
+    quarter = ring.expression(-c * ring.tower.variable(TIME) ** 2) / 4
+    sine, cosine = call("sinroot", quarter), call("cosroot", quarter)
+    first, second = ([ring.expression(v) for v in images[k]] for k in (0, 1))
+    speed = t * sine
+    increments = tuple(speed * (cosine * u + _HALF * speed * v) for u, v in zip(first, second, strict=True))
+    return Solution(increments, "turned")
+
+
+def _circular(
+    first: Sequence[Expression], units: Sequence[Sequence[Expression]], angle: Expression, a: int
+) -> Solution:
+    """sin(θ)A/e + (1 − cos θ)A²/e² for a = 1; tA + (1 − cos θ)A²/e² + (θ − sin θ)A³/e³ for a = 2."""
+    sine, versine = call("sin", angle), call("versin", angle)
+    if a == 1:
+        return Solution(tuple(sine * u + versine * v for u, v in zip(*units, strict=True)), "turned")
+    rest, t = angle - sine, symbol(TIME)
+    increments = tuple(t * f + (versine * u + rest * v) for f, u, v in zip(first, *units, strict=True))
+    return Solution(increments, "turned and shifted")
+
+
+def _hyperbolic(
+    first: Sequence[Expression], units: Sequence[Sequence[Expression]], angle: Expression, a: int
+) -> Solution:
+    """The same with sinh and cosh; 1 − cos θ becomes cosh θ − 1 = 2 sinh²(θ/2)."""
+    s, c = call("sinh", angle / 2), call("cosh", angle / 2)
+    if a == 1:
+        increments = tuple(2 * s * (c * u + s * v) for u, v in zip(*units, strict=True))
+        return Solution(increments, "moved along hyperbolas")
+    sine, versine, t = 2 * s * c, 2 * s**2, symbol(TIME)
+    rest = sine - angle
+    increments = tuple(t * f + (versine * u + rest * v) for f, u, v in zip(first, *units, strict=True))
+    return Solution(increments, "moved along hyperbolas and shifted")
+
+
+def _vanishes(a: Matrix) -> bool:
+    return all(e == 0 for row in a for e in row)
 
 
 def _product(ring: Ring, a: Matrix, b: Matrix) -> Matrix:
@@ -114,32 +168,35 @@ def _ratio(ring: Ring, a: Matrix, b: Matrix) -> Poly | None:
     pairs = [(x, y) for left, right in zip(a, b, strict=True) for x, y in zip(left, right, strict=True)]
     if any(x != 0 and y == 0 for x, y in pairs):
         return None
-    top, bottom = next((x, y) for x, y in pairs if y != 0)
-    d, rest = divmod(top, bottom)
-    if rest != 0 or any(not ring.tower.is_zero(x - d * y) for x, y in pairs):
-        return None
-    return d
+    for top, bottom in ((x, y) for x, y in pairs if y != 0):
+        d, rest = divmod(top, bottom)
+        if rest == 0:
+            return d if all(ring.tower.is_zero(x - d * y) for x, y in pairs) else None
+    return None
 
 
-def _quotient(ring: Ring, element: Poly, divisor: Poly) -> Poly | None:
-    """element/divisor, if it is in the ring."""
-    quotient, rest = divmod(element, divisor)
-    return quotient if rest == 0 else None
+def _quotients(ring: Ring, elements: Sequence[Poly], divisor: Poly) -> list[Expression] | None:
+    """The elements over the divisor, if all quotients are in the ring."""
+    found = [divmod(e, divisor) for e in elements]
+    return None if any(rest != 0 for _, rest in found) else [ring.expression(quotient) for quotient, _ in found]
 
 
-def _settled(ring: Ring, element: Poly | None) -> Expression:
-    if element is None:
-        raise NoClosedFormError("exp(tA) with a quotient that may be 0/0")
-    return ring.expression(element)
+@dataclass(frozen=True)
+class _Root:
+    """c = ±(scale·element)²; ``positive`` is the sign."""
+
+    positive: bool
+    scale: Expression
+    element: Poly
 
 
-def _root(ring: Ring, c: Poly) -> tuple[bool, Fraction, Poly] | None:
-    """(turns, content, e) with c = −content·e² if it turns, content·e² if not, content > 0; None if c is no square."""
+def _root(ring: Ring, c: Poly) -> _Root | None:
+    """The square root of c or of −c, if it is in the ring but for the root of a number."""
     content, factors = c.factor()
     if any(multiplicity % 2 for _, multiplicity in factors):
         return None
-    e = ring.tower.constant(1)
+    element = ring.tower.constant(1)
     for factor, multiplicity in factors:
-        e *= factor ** (int(multiplicity) // 2)
+        element *= factor ** (int(multiplicity) // 2)
     value = rational(content)
-    return value < 0, abs(value), e
+    return _Root(value > 0, sqrt(number(abs(value))), element)

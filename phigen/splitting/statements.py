@@ -12,7 +12,18 @@ from phigen.geometry.system import System, hamiltonian_vector_field
 from phigen.splitting.flow import Flow
 from phigen.splitting.parts import Splitting
 from phigen.splitting.ring import TIME
-from phigen.symbolic.expression import ZERO, derivatives, gradient, substitute, symbol, total
+from phigen.symbolic.expression import (
+    ZERO,
+    Expression,
+    call,
+    derivatives,
+    fold,
+    gradient,
+    rebuild,
+    substitute,
+    symbol,
+    total,
+)
 from phigen.symbolic.verdict import Statement, decide_zero
 
 
@@ -25,6 +36,21 @@ def check(system: System, splitting: Splitting) -> Iterator[Statement]:
         yield _flow_statement(system, flow, k)
 
 
+def _angles_added(e: Expression) -> Expression:
+    """sin, cos and exp of sums and differences by the addition theorems, which the ring does not know."""
+
+    def visit(node: Expression, args: list[Expression]) -> Expression:
+        if node.op not in ("sin", "cos", "exp") or args[0].op not in ("add", "sub"):
+            return rebuild(node, args)
+        a, b = args[0].args[0], args[0].args[1] if args[0].op == "add" else -args[0].args[1]
+        if node.op == "exp":
+            return call("exp", a) * call("exp", b)
+        (sin_a, cos_a), (sin_b, cos_b) = ((call("sin", v), call("cos", v)) for v in (a, b))
+        return sin_a * cos_b + cos_a * sin_b if node.op == "sin" else cos_a * cos_b - sin_a * sin_b
+
+    return fold([e], visit)[0]
+
+
 def _flow_statement(system: System, flow: Flow, k: int) -> Statement:
     """Φ_0 = 1 and dΦ_t/dt = (π∇H_k)∘Φ_t."""
     names = system.coordinates
@@ -34,6 +60,6 @@ def _flow_statement(system: System, flow: Flow, k: int) -> Statement:
     point = {c: symbol(c) + e for c, e in zip(names, flow.increment, strict=True) if not e.is_zero}
     required = substitute(field, point)
     residuals = [(f"{c} at t = 0", e) for c, e in zip(names, start, strict=True)]
-    residuals += [(f"rate of {c}", a - b) for c, a, b in zip(names, rates, required, strict=True)]
+    residuals += [(f"rate of {c}", a - _angles_added(b)) for c, a, b in zip(names, rates, required, strict=True)]
     name = f"the flow Φ of H_{k}: Φ_0 = 1, dΦ_t/dt = π∇H_{k}∘Φ_t"
     return decide_zero(name, residuals, system.positive, flow.manner)

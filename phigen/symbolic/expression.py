@@ -34,6 +34,7 @@ from hashlib import blake2b
 from typing import Any, TypeVar
 from weakref import WeakValueDictionary
 
+from phigen.symbolic.entire import ENTIRE
 from phigen.symbolic.special import SPECIAL, coefficient, order_of
 
 #: Functions of an expression, with their number of arguments.
@@ -58,7 +59,10 @@ FUNCTIONS: dict[str, int] = {
     "abs": 1,
     "sign": 1,  # made by differentiating abs, not accepted in a spec
     "power": 2,  # base**exponent with an exponent that is not a rational number
-} | dict.fromkeys(SPECIAL, 1)  # of the exponential bi-realisation, not accepted in a spec
+} | dict.fromkeys((*SPECIAL, *ENTIRE), 1)  # of the exponential bi-realisation and of flows, not accepted in a spec
+
+#: Functions of phigen's own, which a spec cannot name.
+OWN = ("sign", "power", "expm1", "versin", *SPECIAL, *ENTIRE)
 
 _NODES: WeakValueDictionary[tuple[Any, ...], Expression] = WeakValueDictionary()
 _RANK = {"number": 0, "pi": 1, "E": 1, "symbol": 2}
@@ -319,6 +323,8 @@ def call(function: str, *args: Expression) -> Expression:
         raise ValueError(f"{function} takes {FUNCTIONS[function]} argument(s), not {len(args)}")
     first = args[0]
     if len(args) == 1 and first.is_zero:
+        if function in ENTIRE:
+            return number(ENTIRE[function].coefficient(0))
         if function in SPECIAL:
             return number(coefficient(order_of(function), 0))
         if function in ("exp", "cos", "cosh"):
@@ -479,6 +485,8 @@ def partials(e: Expression) -> list[Expression]:
             return [ZERO]
         case "phi0" | "phi1":
             return [call(SPECIAL[order_of(e.op) + 1], a)]
+        case op if op in ENTIRE and (rule := ENTIRE[op].derivative):
+            return [number(rule[0]) * call(rule[1], a)]
     raise ValueError(f"no derivative is known for {e.op}")
 
 

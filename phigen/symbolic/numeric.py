@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from fractions import Fraction
 from typing import Any
 
+from phigen.symbolic import entire
 from phigen.symbolic.expression import Expression, fold, topological
 from phigen.symbolic.special import SPECIAL, in_double, order_of, precisely
 
@@ -133,6 +134,9 @@ def _visitor(
             return 2 * library.sin(args[0] / 2) ** 2
         if node.op in ("pi", "E"):
             return +getattr(library, node.op.lower())
+        if node.op in entire.ENTIRE:
+            in_floats = library is math
+            return entire.in_double(node.op, args[0]) if in_floats else entire.precisely(library, node.op, args[0])
         if node.op in SPECIAL:
             order = order_of(node.op)
             return in_double(order, args[0]) if library is math else precisely(library, order, args[0])

@@ -15,6 +15,7 @@ from typing import Any
 
 from flint import Ordering, fmpq, fmpq_mpoly_ctx
 
+from phigen.symbolic.entire import ENTIRE
 from phigen.symbolic.expression import EULER, ONE, PI, Expression, call, derivatives, fold, number, power, symbol
 from phigen.symbolic.horner import horner
 from phigen.symbolic.special import SPECIAL, coefficient, order_of
@@ -187,6 +188,8 @@ class Tower:
         if name == "versin":
             return 1 - self.function("cos", args)
         first = args[0]
+        if name in ENTIRE:
+            return self._entire(name, first)
         if name in SPECIAL:
             return self._special(order_of(name), first)
         if len(args) == 1 and first.is_constant() and first == 0 and name in ("exp", "cos", "cosh"):
@@ -205,6 +208,19 @@ class Tower:
                 if ratio and ratio > 0 and ratio.denominator == 1:
                     return self.variable(g.name) ** int(ratio)
         return self._generator(name, args)
+
+    def _entire(self, name: str, s: Poly) -> Poly:
+        """A function of `ENTIRE`, by cosroot, sinroot, exp and 1/s; the first two always come together."""
+        if s.is_constant() and s == 0:
+            return self.constant(ENTIRE[name].coefficient(0))
+        if name in ("exprel", "exprel1"):
+            inverse, exp = self._reciprocal(s), self.function("exp", [s])
+            relative = (exp - 1) * inverse
+            return relative if name == "exprel" else (exp - relative) * inverse
+        cos, sin = self._generator("cosroot", [s]), self._generator("sinroot", [s])
+        if name == "sinroot1":
+            return (cos - sin) * self._reciprocal(s) * self.constant(Fraction(1, 2))
+        return cos if name == "cosroot" else sin
 
     def _special(self, order: int, s: Poly) -> Poly:
         """φ, φ' or φ'' of an element, written with φ(s) and 1/s alone by the Riccati equation of φ."""
@@ -328,6 +344,8 @@ class Tower:
                 if other is not g and other.kind == "exp" and other.arguments[0] == -g.arguments[0]:
                     top, w = max(parts), self.variable(other.name)
                     return self.combine(c * w ** (top - e) for e, c in parts.items())
+        if g.kind == "cosroot":
+            return self._eliminate_cosroot(parts, g)
         if partner:
             for other in self.generators:
                 if other.kind == partner and other.arguments == g.arguments:
@@ -337,6 +355,12 @@ class Tower:
                     own = self.variable(g.name)
                     return self.combine(c * own ** (e % 2) * square ** (e // 2) for e, c in parts.items())
         return element
+
+    def _eliminate_cosroot(self, parts: dict[int, Poly], g: Generator) -> Poly:
+        """By cosroot² + s·sinroot² = 1."""
+        own, sin = self.variable(g.name), self._generator("sinroot", g.arguments)
+        square = 1 - g.arguments[0] * sin**2
+        return self.combine(c * own ** (e % 2) * square ** (e // 2) for e, c in parts.items())
 
     def _eliminate_root(self, parts: dict[int, Poly], g: Generator) -> Poly:
         base, n, own = g.arguments[0], g.degree, self.variable(g.name)

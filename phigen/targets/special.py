@@ -1,10 +1,11 @@
-"""What the templates of φ and its derivatives are filled with, in C and in NumPy."""
+"""What the templates of φ and its derivatives, and of entire functions, are filled with, in C and in NumPy."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 
 from phigen.scheme.program import Program
+from phigen.symbolic.entire import ENTIRE
 from phigen.symbolic.expression import topological
 from phigen.symbolic.special import MIDDLE, NEAR, POLE, SPECIAL, near_coefficients, order_of, rest_coefficients
 
@@ -45,4 +46,36 @@ def values(function: str, name: str) -> Mapping[str, object]:
         "rest_last": repr(rest[-1]),
         "rest_others": [repr(c) for c in rest[-2::-1]],
         "closed": _CLOSED[: order + 1],
+    }
+
+
+_FAR = {
+    "cosroot": "np.where(s > 0.0, np.cos(np.sqrt(np.abs(s))), np.cosh(np.sqrt(np.abs(s))))",
+    "sinroot": "np.where(s > 0.0, np.sin(np.sqrt(np.abs(s))), np.sinh(np.sqrt(np.abs(s)))) / np.sqrt(np.abs(s))",
+    "sinroot1": "(_cosroot(s) - _sinroot(s)) / (2.0 * s)",
+    "exprel": "np.expm1(s) / s",
+    "exprel1": "(np.exp(s) - _exprel(s)) / s",
+}
+#: What the closed form of a function calls.
+NEEDS = {"sinroot1": ("cosroot", "sinroot"), "exprel1": ("exprel",)}
+
+
+def entire_used(program: Program) -> list[str]:
+    """The functions of `ENTIRE` that the kernels call, and those that these need, in order."""
+    ops = {e.op for e in topological([e for kernel in program.kernels.values() for e in kernel.roots])}
+    ops |= {needed for f in NEEDS if f in ops for needed in NEEDS[f]}
+    return [name for name in ENTIRE if name in ops]
+
+
+def entire_values(function: str) -> Mapping[str, object]:
+    """The values of the template for one function of `ENTIRE` in NumPy."""
+    found = ENTIRE[function]
+    last, *others = [repr(float(c)) for c in reversed(found.terms())]
+    return {
+        "function": function,
+        "meaning": found.meaning,
+        "radius": repr(found.radius),
+        "last": last,
+        "others": others,
+        "far": _FAR[function],
     }

@@ -43,6 +43,28 @@ SYSTEMS = {
         "coordinates: [x, y]\nparameters: {b: 2}\npoisson: {brackets: {x: {y: x + b}}}\nhamiltonian: x**2 + y**2",
         None,
     ),
+    "a frequency that may vanish, and may be imaginary": (
+        PLANE + "parameters: {k: 1}\nhamiltonian: p**2/2 + k*q**2/2 + p**4 + q**4",
+        None,
+    ),
+    "a sphere of angular velocities": (
+        "coordinates: [x, y, z, u, v, w]\npoisson: {lie_algebra: {name: se(3)}}\n"
+        "hamiltonian: sqrt(1 + x**2 + y**2 + z**2) + u",
+        None,
+    ),
+    "two vortices": (
+        "coordinates: [x, y, u, v]\npoisson: {canonical: {q: [x, u], p: [y, v]}}\n"
+        "hamiltonian: log((x - u)**2 + (y - v)**2)",
+        ["x, y, u, v turned"],
+    ),
+    "a rate that may vanish": (
+        "coordinates: [a, b, c]\npoisson: {brackets: {a: {b: a}, b: {c: 2*a**2}}}\nhamiltonian: a + b**2 + c",
+        None,
+    ),
+    "the height of a pendulum as a coordinate": (
+        "coordinates: [x, p, V]\npoisson: {nambu: [V + cos(x)]}\nhamiltonian: p**2/2 + V",
+        ["x shifted; V turned", "p shifted"],
+    ),
     "a field that depends on the place": (
         "coordinates: [x, y, u, v]\npoisson: {brackets: {x: {u: 1}, y: {v: 1}, u: {v: 1 + x**2 + y**2}}}\n"
         "hamiltonian: (u**2 + v**2)/2 + x**4",

@@ -9,6 +9,7 @@ import pytest
 from support import TARGETS, compile_text, solver, values
 
 from phigen.scheme.program import Kernel, Output
+from phigen.symbolic.entire import ENTIRE
 from phigen.symbolic.expression import EULER, FUNCTIONS, ONE, PI, call, number, power, raw, symbol
 from phigen.symbolic.special import SPECIAL
 
@@ -42,7 +43,7 @@ NUMBERS += [Fraction(1, 3), Fraction(-7, 11), Fraction(1, 1024), Fraction(123456
 NUMBERS += [Fraction(1, 10**39), Fraction(-1, 10**17), Fraction("0.1"), Fraction("-3.14159"), Fraction(2, 10**6 + 3)]
 
 #: Relative to the value. φ' and φ'' occur in Newton matrices and in what multiplies a last correction, nowhere else.
-BOUNDS = {"phi1": 1e-13, "phi2": 1e-13}
+BOUNDS = {"phi1": 1e-13, "phi2": 1e-13, "sinroot1": 1e-14, "exprel1": 1e-14}
 
 
 def binary(op, a, b):
@@ -55,6 +56,8 @@ def cases():
     for name in FUNCTIONS:
         if name in SPECIAL:
             yield from ((f"{name} {where}", call(name, e)) for where, e in SPECIAL_ARGUMENTS.items())
+        elif name in ENTIRE:
+            yield from ((f"{name} of {e}", call(name, e)) for e in (x / 5, -x / 5, y, z, -z))
         else:
             yield name, call(name, *ARGUMENTS[name])
     for exponent in EXPONENTS:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from phigen.scheme.program import Program
 from phigen.targets import special
-from phigen.targets.c import extras, splitting
+from phigen.targets.c import extras, small, splitting
 from phigen.targets.c.kernels import apart, function, members, printer, wrapped_arguments
 from phigen.targets.header import CHECKSUM, checksum, header_lines, plain
 from phigen.targets.path import Syntax, kinds, reads_coefficients, statements
@@ -158,6 +158,7 @@ def _body(program: Program) -> str:
 
     pieces = [_render("preamble.c", values)]
     pieces += [_render("phi.c", special.values(f, f"{program.name}_{f}")) for f in special.used(program)]
+    pieces += small.pieces(program)
     if program.driver != "splitting":
         pieces.append(static("prepare"))
     if program.driver not in ("explicit", "splitting"):
@@ -178,7 +179,8 @@ def _body(program: Program) -> str:
         pieces += splitting.pieces(program, values)
     else:
         pieces += [static("explicit"), _render("explicit.c", values)]
-    pieces.append(_render("compose.c", values))
+    if program.driver != "splitting":
+        pieces.append(_render("compose.c", values))
     if program.gauge:
         pieces += [static("guide"), static("products"), _render("gauge.c", values)]
         pieces.append(_render("choose_gauge.c", values))

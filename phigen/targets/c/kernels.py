@@ -6,6 +6,7 @@ import textwrap
 from collections.abc import Mapping, Sequence
 
 from phigen.scheme.program import Kernel, Program
+from phigen.symbolic.entire import ENTIRE
 from phigen.symbolic.special import SPECIAL
 from phigen.targets.code import Code, lower, parts
 from phigen.targets.header import plain
@@ -104,7 +105,7 @@ def _body(
     program: Program, kernel: Kernel, code: Code, functions: Mapping[str, str], workspace: int, *, exported: bool
 ) -> list[str]:
     arrays = [*kernel.inputs, *(o.name for o in kernel.outputs), "work"]
-    special = {f"function:{f}": f"{program.name}_{f}" for f in SPECIAL}
+    special = {f"function:{f}": f"{program.name}_{f}" for f in (*SPECIAL, *ENTIRE)}
     scope = Scope({*C_RESERVED, *arrays, *special.values(), *functions.values()})
     for f, name in special.items():
         scope.bind(f, name)

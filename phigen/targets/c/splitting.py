@@ -7,21 +7,16 @@ from dataclasses import replace
 
 from phigen.scheme.alternation import Schedule
 from phigen.scheme.program import Kernel, Output, Program
-from phigen.symbolic.expression import topological
 from phigen.targets.c.kernels import FUNCTIONS, function
+from phigen.targets.c.small import FLOW_FUNCTIONS
 from phigen.targets.rendering import render
-
-#: Functions of small arguments with a template of their own: flows live on them, and libm's are slow there.
-SMALL = ("expm1", "sin", "versin")
 
 
 def pieces(program: Program, values: Mapping[str, object]) -> list[str]:
     """The functions of the driver."""
     kernels, schedule, own = program.kernels, schedule_of(program), {**values, **_values(program)}
-    used = {e.op for k in _flows(program) for e in topological(kernels[k].roots)}
-    found = [render("c", f"small_{f}.c", values) for f in SMALL if f in used]
-    functions = FUNCTIONS | {f: f"{program.name}_{f}" for f in SMALL}
-    found += [function(program, replace(kernels["prepare"], name="prepare_row")) + "\n", render("c", "add.c", values)]
+    prepare = function(program, replace(kernels["prepare"], name="prepare_row")) + "\n"
+    found, functions = [prepare, render("c", "add.c", values)], _functions(program)
     for k, name in enumerate(_flows(program), 1):
         kernel, moved = _compact(kernels[name], k)
         found.append(function(program, kernel, functions=functions) + "\n")
@@ -33,7 +28,8 @@ def pieces(program: Program, values: Mapping[str, object]) -> list[str]:
 
 def tangent(program: Program, values: Mapping[str, object]) -> list[str]:
     """The derivative of a step."""
-    found = [function(program, program.kernels[f"tangent{k}"]) + "\n" for k, _ in enumerate(_flows(program), 1)]
+    kernels = [program.kernels[f"tangent{k}"] for k, _ in enumerate(_flows(program), 1)]
+    found = [function(program, kernel, functions=_functions(program)) + "\n" for kernel in kernels]
     flows, count = schedule_of(program).flows, len(_flows(program))
     own = {
         **values,
@@ -51,6 +47,11 @@ def schedule_of(program: Program) -> Schedule:
     if program.schedule is None:
         raise ValueError(f"{program.name} is no splitting")
     return program.schedule
+
+
+def _functions(program: Program) -> dict[str, str]:
+    """What flows call functions: those that have a version for small arguments."""
+    return FUNCTIONS | {f: f"{program.name}_{f}" for f in FLOW_FUNCTIONS}
 
 
 def _flows(program: Program) -> list[str]:

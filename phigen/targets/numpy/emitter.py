@@ -8,6 +8,7 @@ from dataclasses import replace
 
 from phigen.scheme.alternation import Schedule
 from phigen.scheme.program import Kernel, Program
+from phigen.symbolic.entire import ENTIRE
 from phigen.symbolic.expression import Expression
 from phigen.symbolic.special import SPECIAL
 from phigen.targets import special
@@ -59,6 +60,7 @@ def emit(program: Program, command: str) -> dict[str, str]:
     kernels = program.kernels
     pieces = [render("numpy", "preamble.py", _values(program))]
     pieces += [render("numpy", "phi.py", special.values(f, f"_{f}")) for f in special.used(program)]
+    pieces += [render("numpy", "entire.py", special.entire_values(f)) for f in special.entire_used(program)]
     pieces += _driver(program)
     pieces.append(render("numpy", "gauge.py" if program.gauge else "no_gauge.py", _values(program)))
     pieces += [_function(program, kernels[k]) for k in ("guide", "products") if k in kernels]
@@ -153,8 +155,9 @@ def _function(program: Program, kernel: Kernel) -> str:
     code = lower(kernel)
     arguments = ", ".join("parameters" if i == "params" else i for i in kernel.inputs)
     lines = [f"def _{kernel.name}({arguments}):", *_docstring(kernel.purpose)]
-    scope = Scope({*PYTHON_RESERVED, *kernel.inputs, *(o.name for o in kernel.outputs), *(f"_{f}" for f in SPECIAL)})
-    for f in SPECIAL:
+    own = (*SPECIAL, *ENTIRE)
+    scope = Scope({*PYTHON_RESERVED, *kernel.inputs, *(o.name for o in kernel.outputs), *(f"_{f}" for f in own)})
+    for f in own:
         scope.bind(f"function:{f}", f"_{f}")
     lines += _bindings(kernel, code, scope)
     printer = _printer(scope)

@@ -1,0 +1,117 @@
+"""Entire functions in which flows are written, so that nothing divides by a frequency that may be 0.
+
+- ``cosroot``(s) = cos √s, ``sinroot``(s) = sin(√s)/√s: cosh and sinh where s < 0, one formula for rotations and
+  hyperbolic motions alike; cosroot² + s·sinroot² = 1
+- ``exprel``(s) = (e^s − 1)/s
+- ``sinroot1`` and ``exprel1`` are the derivatives of these two, which tangent maps need
+
+All are of phigen's own, and not accepted in a spec.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from fractions import Fraction
+from itertools import count
+from typing import Any
+
+#: Terms beyond this, relative to the first, are left out of a series in double precision.
+NEGLIGIBLE = 1e-17
+
+
+@dataclass(frozen=True)
+class Entire:
+    """A function Σ c_n s^n: its coefficients, and the closed form that is used for |s| > ``radius``.
+
+    ``closed`` takes a library of functions (math or an mpmath context) and s. ``derivative`` is a factor and the name
+    of a function, None where it is not available. ``meaning`` is for the comments of generated code.
+    """
+
+    meaning: str
+    coefficient: Callable[[int], Fraction]
+    closed: Callable[[Any, Any], Any]
+    derivative: tuple[Fraction, str] | None
+    radius: float
+
+    def terms(self) -> list[Fraction]:
+        """The coefficients that double precision needs for |s| ≤ ``radius``."""
+        first = abs(self.coefficient(0))
+        n = next(n for n in count(1) if abs(self.coefficient(n)) * self.radius**n < NEGLIGIBLE * first)
+        return [self.coefficient(k) for k in range(n)]
+
+
+def _cosroot(library: Any, s: Any) -> Any:
+    return library.cos(library.sqrt(s)) if s > 0 else library.cosh(library.sqrt(-s))
+
+
+def _sinroot(library: Any, s: Any) -> Any:
+    root = library.sqrt(abs(s))
+    return (library.sin(root) if s > 0 else library.sinh(root)) / root
+
+
+def _sinroot1(library: Any, s: Any) -> Any:
+    return (_cosroot(library, s) - _sinroot(library, s)) / (2 * s)
+
+
+def _exprel(library: Any, s: Any) -> Any:
+    return library.expm1(s) / s
+
+
+def _exprel1(library: Any, s: Any) -> Any:
+    return (library.exp(s) - _exprel(library, s)) / s
+
+
+def _factorial(n: int) -> Fraction:
+    return Fraction(1, math.factorial(n))
+
+
+ENTIRE: dict[str, Entire] = {
+    "cosroot": Entire(
+        "cos(sqrt(s)), cosh(sqrt(-s)) for negative s",
+        lambda n: (-1) ** n * _factorial(2 * n),
+        _cosroot,
+        (Fraction(-1, 2), "sinroot"),
+        1.0,
+    ),
+    "sinroot": Entire(
+        "sin(sqrt(s))/sqrt(s), sinh(sqrt(-s))/sqrt(-s) for negative s",
+        lambda n: (-1) ** n * _factorial(2 * n + 1),
+        _sinroot,
+        (Fraction(1), "sinroot1"),
+        1.0,
+    ),
+    "sinroot1": Entire(
+        "the derivative of sin(sqrt(s))/sqrt(s)",
+        lambda n: (-1) ** (n + 1) * (n + 1) * _factorial(2 * n + 3),
+        _sinroot1,
+        None,
+        1.0,
+    ),
+    "exprel": Entire("(exp(s) - 1)/s", lambda n: _factorial(n + 1), _exprel, (Fraction(1), "exprel1"), 0.5),
+    "exprel1": Entire("the derivative of (exp(s) - 1)/s", lambda n: (n + 1) * _factorial(n + 2), _exprel1, None, 0.5),
+}
+
+
+def in_double(name: str, s: float) -> float:
+    """The value in double precision, as the generated code computes it."""
+    function = ENTIRE[name]
+    if abs(s) > function.radius:
+        return float(function.closed(math, s))
+    value = 0.0
+    for c in reversed(function.terms()):
+        value = value * s + float(c)
+    return value
+
+
+def precisely(context: Any, name: str, s: Any) -> Any:
+    """The value in an mpmath context, to its precision but for a few digits."""
+    function = ENTIRE[name]
+    if abs(s) > 1:
+        return function.closed(context, s)
+    value = context.zero
+    for n in reversed(range(context.dps // 2 + 20)):
+        c = function.coefficient(n)
+        value = value * s + context.mpf(c.numerator) / c.denominator
+    return value
