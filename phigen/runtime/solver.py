@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import operator
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from difflib import get_close_matches
 
 import numpy as np
@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from phigen.errors import StepError
 from phigen.runtime.crossings import CrossingFinder, Function, Section
 from phigen.runtime.interface import Backend, BackendError, Floats, Interface, MissingExtraError, Progress, row_steps
-from phigen.runtime.session import rows_along
+from phigen.runtime.session import Session, rows_along
 from phigen.runtime.trajectory import Trajectory
 
 _ADVICE = {
@@ -84,8 +84,8 @@ class Solver:
         """The state (DIM,) one step of size ``h`` after ``x`` (DIM,); raises `StepError`."""
         values = self._parameters(parameters, more)
         start, h = self._state(x, "x"), _step_size(h)
+        session = self._started(start, h, values)
         try:
-            session = self.backend.start(start, values)
             session.advance(h, 1)
         except BackendError as error:
             raise self._failure(error, h, None) from error
@@ -101,15 +101,23 @@ class Solver:
         """
         values = self._parameters(parameters, more)
         start, h = self._state(x, "x"), _step_size(h)
-        try:
-            session = self.backend.start(start, values)
-            tangent = session.advance_tangent(h)
-        except MissingExtraError:
-            hint = "compile it with tangent=True, or say tangent: true in the spec"
-            raise TypeError(f"{self.interface.name} was compiled without step_tangent; {hint}") from None
-        except BackendError as error:
-            raise self._failure(error, h, None) from error
+        session = self._started(start, h, values)
+        tangent = self._with_tangent(session, h)
         return session.state(), tangent
+
+    def tangents(
+        self, x0: ArrayLike, h: float, steps: int, *, parameters: Mapping[str, float] | None = None, **more: float
+    ) -> Iterator[tuple[Floats, Floats]]:
+        """After each step of a trajectory, its state (DIM,) and the derivative (DIM, DIM) of that step.
+
+        The steps are those of `integrate`. Raises what `step_tangent` does.
+        """
+        values = self._parameters(parameters, more)
+        start, h, steps = self._state(x0, "x0"), _step_size(h), _count(steps, "steps", 0)
+        session = self._started(start, h, values)
+        for _ in range(steps):
+            tangent = self._with_tangent(session, h)
+            yield session.state(), tangent
 
     def section(
         self,
@@ -190,6 +198,21 @@ class Solver:
             parameters=parameters,
             coordinates=self.interface.coordinates,
         )
+
+    def _started(self, start: Floats, h: float, values: Mapping[str, float]) -> Session:
+        try:
+            return self.backend.start(start, values)
+        except BackendError as error:
+            raise self._failure(error, h, None) from error
+
+    def _with_tangent(self, session: Session, h: float) -> Floats:
+        try:
+            return session.advance_tangent(h)
+        except MissingExtraError:
+            hint = "compile it with tangent=True, or say tangent: true in the spec"
+            raise TypeError(f"{self.interface.name} was compiled without step_tangent; {hint}") from None
+        except BackendError as error:
+            raise self._failure(error, h, None) from error
 
     def _section(self, found: Sequence[tuple[float, Floats]]) -> Section:
         t, x = np.array([t for t, _ in found]), np.array([x for _, x in found])
