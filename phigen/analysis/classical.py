@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 
 from phigen.analysis import dop853
-from phigen.runtime.interface import Progress, row_steps
+from phigen.runtime.interface import row_steps
 
 Floats = NDArray[np.float64]
 Field = Callable[[Floats], Floats]
@@ -17,6 +17,8 @@ Step = Callable[[Field, Floats, float], Floats]
 #: Iterations after which the implicit midpoint rule gives up; each gains a factor of order h.
 _ITERATIONS = 100
 _TOLERANCE = 4e-16
+#: Steps between two pieces of a long run.
+_PIECE = 500
 
 
 def euler(f: Field, x: Floats, h: float) -> Floats:
@@ -76,31 +78,39 @@ METHODS: Mapping[str, tuple[Step, int]] = {
 }
 
 
-def integrate(
-    method: str, field: Field, x0: Floats, h: float, steps: int, stride: int = 1, progress: Progress | None = None
-) -> Floats:
+def integrate(method: str, field: Field, x0: Floats, h: float, steps: int, stride: int = 1) -> Floats:
     """States (rows, DIM) of the steps 0, stride, 2·stride, … and the last; rows after a failure are NaN."""
+    pieces = [x for _, x in pieces_of(method, field, x0, h, steps, stride)]
+    states = np.full((len(row_steps(steps, stride)), len(x0)), np.nan)
+    found = np.concatenate(pieces)
+    states[: len(found)] = found
+    return states
+
+
+def pieces_of(
+    method: str, field: Field, x0: Floats, h: float, steps: int, stride: int = 1
+) -> Iterator[tuple[NDArray[np.int64], Floats]]:
+    """Numbers (rows,) and states (rows, DIM) of the steps 0, stride, 2·stride, … and the last, in pieces.
+
+    Ends with the last finite row if the method fails.
+    """
     step, _ = METHODS[method]
-    marks = row_steps(steps, stride)
-    states = np.full((len(marks), len(x0)), np.nan)
-    states[0] = x = np.array(x0, dtype=np.float64)
+    x = np.array(x0, dtype=np.float64)
     carry = np.zeros_like(x)
-    done = 0
-    report_every = max(1, steps // 200)
-    with np.errstate(all="ignore"):
-        for row, mark in enumerate(marks.tolist()[1:], start=1):
-            while done < mark:
-                # Compensated, as phigen's solvers are: the comparison is about the methods.
-                change = (step(field, x, h) - x) + carry
-                following = x + change
-                carry = change - (following - x)
-                x = following
-                done += 1
-                if progress and done % report_every == 0:
-                    progress(done)
+    numbers, states = [0], [x]
+    for done in range(1, steps + 1):
+        with np.errstate(all="ignore"):
+            # Compensated, as phigen's solvers are: the comparison is about the methods.
+            change = (step(field, x, h) - x) + carry
+            following = x + change
+            carry = change - (following - x)
+            x = following
+        if done % stride == 0 or done == steps:
             if not np.isfinite(x).all():
                 break
-            states[row] = x
-    if progress:
-        progress(steps)
-    return states
+            numbers.append(done)
+            states.append(x)
+        if done % _PIECE == 0:
+            yield np.array(numbers, dtype=np.int64), np.array(states).reshape(-1, len(x))
+            numbers, states = [], []
+    yield np.array(numbers, dtype=np.int64), np.array(states).reshape(-1, len(x))

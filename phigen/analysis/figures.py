@@ -7,21 +7,23 @@ what they show. matplotlib is the optional extra ``plot``; without it every func
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from phigen.analysis.arrays import Floats
-from phigen.analysis.drawing import error_curves, phase_space, precision_curves, section_plane
+from phigen.analysis.drawing import error_curves, exponents, phase_space, precision_curves, section_plane
 from phigen.analysis.drawing.palette import PALETTE, SUFFIXES, save, styled, svg
 from phigen.analysis.precision import Study
 from phigen.runtime.trajectory import Trajectory
 from phigen.symbolic.expression import Expression
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure, FigureBase
 
-__all__ = ["PALETTE", "SUFFIXES", "WIDTH", "convergence_figure", "error_figure", "run_figure", "save",
-           "section_figure", "svg", "trajectory_figure", "work_precision_figure"]  # fmt: skip
+    from phigen.analysis.lyapunov import Spectrum
+
+__all__ = ["PALETTE", "SUFFIXES", "WIDTH", "convergence_figure", "error_figure", "lyapunov_figure", "run_figure",
+           "save", "section_figure", "svg", "trajectory_figure", "work_precision_figure"]  # fmt: skip
 
 #: The widths of a page and of a single panel, in inches; PNG files have 200 dots per inch.
 WIDTH, NARROW = 7.2, 4.8
@@ -84,19 +86,39 @@ def run_figure(
     methods: Mapping[str, Trajectory],
     casimirs: Mapping[str, Expression],
     sections: Mapping[str, Floats] | None = None,
+    spectrum: Spectrum | None = None,
     title: str = "",
 ) -> Figure:
-    """All there is to see of a run on one page: the trajectory of the first method, the section, the errors of all."""
+    """All there is to see of a run on one page.
+
+    The trajectory of the first method, the sections and the Lyapunov exponents if there are any, the errors of all.
+    """
     first = next(iter(methods.values()))
-    heights = [phase_space.height(first.coordinates), *[_SECTION] * bool(sections), error_curves.height(methods)]
+    parts: list[tuple[float, Callable[[FigureBase], None]]] = [
+        (phase_space.height(first.coordinates), lambda part: phase_space.draw_trajectory(part, first, casimirs)),
+        (error_curves.height(methods), lambda part: error_curves.draw_errors(part, methods)),
+    ]
+    if sections:
+        parts.insert(
+            1, (_SECTION, lambda part: section_plane.draw_section(part.add_subplot(), sections, first.coordinates))
+        )
+    if spectrum:
+        parts.append((exponents.HEIGHT, lambda part: exponents.draw_exponents(part.add_subplot(), spectrum)))
+    heights = [height for height, _ in parts]
     figure = _figure(sum(heights))
     if title:
         figure.suptitle(title, fontsize=11)
-    parts = list(figure.subfigures(len(heights), 1, height_ratios=heights, squeeze=False)[:, 0])
-    phase_space.draw_trajectory(parts[0], first, casimirs)
-    if sections:
-        section_plane.draw_section(parts[1].add_subplot(), sections, first.coordinates)
-    error_curves.draw_errors(parts[-1], methods)
+    places = figure.subfigures(len(parts), 1, height_ratios=heights, squeeze=False)[:, 0]
+    for place, (_, draw) in zip(places, parts, strict=True):
+        draw(place)
+    return figure
+
+
+@styled
+def lyapunov_figure(spectrum: Spectrum) -> Figure:
+    """How the Lyapunov exponents of a trajectory converged."""
+    figure = _figure(exponents.HEIGHT, NARROW)
+    exponents.draw_exponents(figure.add_subplot(), spectrum)
     return figure
 
 

@@ -9,7 +9,8 @@ per unit of time.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -59,44 +60,42 @@ class Spectrum:
         return float(np.max(np.ptp(late, axis=0)))
 
 
-@dataclass
 class FrameGrowth:
-    """The growth of a frame of tangent vectors, step by step: ``frame`` (DIM, DIM), and ``logs``, its logarithms."""
+    """The growth of a frame of tangent vectors, step by step; ``state`` is all there is, as arrays."""
 
-    h: float
-    frame: Floats
-    logs: Floats
-    steps: int = 0
-    times: list[float] = field(default_factory=list)
-    history: list[Floats] = field(default_factory=list)
-
-    @classmethod
-    def of(cls, dimension: int, h: float) -> FrameGrowth:
-        """The frame at the start."""
-        return cls(h, np.eye(dimension), np.zeros(dimension))
+    def __init__(self, dimension: int, h: float) -> None:
+        self._h = h
+        self.state: dict[str, Any] = {
+            "frame": np.eye(dimension),
+            "logs": np.zeros(dimension),
+            "steps": np.zeros((), dtype=np.int64),
+            "times": np.empty(0),
+            "history": np.empty((0, dimension)),
+        }
 
     def see(self, tangent: Floats) -> None:
         """Carry the frame through one step of that derivative."""
-        self.frame, r = np.linalg.qr(tangent @ self.frame)
-        self.logs += np.log(np.abs(np.diagonal(r)))
-        self.steps += 1
-        if self.steps >= _SPACING ** len(self.times):
-            self._note()
+        state = self.state
+        state["frame"], r = np.linalg.qr(tangent @ state["frame"])
+        state["logs"] = state["logs"] + np.log(np.abs(np.diagonal(r)))
+        state["steps"] = state["steps"] + 1
+        if state["steps"] >= _SPACING ** len(state["times"]):
+            state["times"], state["history"] = self._noted()
 
     def spectrum(self) -> Spectrum:
         """The exponents so far; raises `ValueError` if no step was made."""
-        if not self.steps:
+        if not self.state["steps"]:
             raise ValueError("there are no exponents without a step")
-        if self.times[-1] != abs(self.steps * self.h):
-            self._note()
-        history = np.array(self.history)
+        times, history = self._noted()
         order = np.argsort(-history[-1], kind="stable")
-        return Spectrum(history[-1][order], np.array(self.times), history[:, order])
+        return Spectrum(history[-1][order], times, history[:, order])
 
-    def _note(self) -> None:
-        t = abs(self.steps * self.h)
-        self.times.append(t)
-        self.history.append(self.logs / t)
+    def _noted(self) -> tuple[Floats, Floats]:
+        """Times and history with the exponents of now at their end."""
+        t, times, history = abs(float(self.state["steps"]) * self._h), self.state["times"], self.state["history"]
+        if len(times) and times[-1] == t:
+            return times, history
+        return np.append(times, t), np.vstack([history, self.state["logs"] / t])
 
 
 def spectrum(
@@ -107,7 +106,7 @@ def spectrum(
     ``solver`` must be compiled with ``tangent=True``, else `TypeError`. Raises `StepError`, and `ValueError` for wrong
     arguments.
     """
-    growth = FrameGrowth.of(len(solver.coordinates), h)
+    growth = FrameGrowth(len(solver.coordinates), h)
     for _, tangent in solver.tangents(x0, h, steps, parameters=parameters):
         growth.see(tangent)
     return growth.spectrum()

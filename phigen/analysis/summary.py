@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from phigen.analysis.arrays import Floats, evaluate
 from phigen.geometry.system import System
@@ -17,6 +19,9 @@ WINDOWS = 10
 
 #: A quantity that starts below this fraction of the largest coordinate counts as zero: its error is absolute.
 _NEGLIGIBLE = 1e-10
+
+#: The largest error of a window without rows.
+_NOTHING = -1.0
 
 
 @dataclass(frozen=True)
@@ -58,37 +63,100 @@ def summarise(
     method: str, system: System, run: Run | None, parameters: Mapping[str, float], t: Floats, x: Floats
 ) -> Summary:
     """The summary of states ``x`` (rows, DIM) at times ``t``, all quantities evaluated from their formulas."""
-    rows = len(x)
-    good = int(np.argmin(np.isfinite(x).all(axis=1))) or rows
-    t, x = t[:good], x[:good]
-    values: dict[str, Any] = {**parameters, **{c: x[:, i] for i, c in enumerate(system.coordinates)}}
-    scale = float(np.max(np.abs(x[0]), initial=0.0))
+    watch = Watch(method, system, run, parameters, len(x))
+    watch.see(t, x)
+    return watch.summary()
 
-    def drifts(formulas: Mapping[str, Any]) -> dict[str, Drift]:
-        arrays = evaluate(list(formulas.values()), values)
-        return {name: drift(np.broadcast_to(a, t.shape), scale) for name, a in zip(formulas, arrays, strict=True)}
 
-    return Summary(
-        method=method,
-        energy=drifts({"H": system.hamiltonian})["H"],
-        casimirs=drifts(system.casimirs),
-        invariants=drifts(system.invariants),
-        exact=_against_exact(system, run, parameters, t, x) if run and run.exact else None,
-        final=tuple(x[-1].tolist()),
-        good=good,
-        rows=rows,
-    )
+class Watch:
+    """Sums up the states of one method as they come, in memory that does not grow with their number.
+
+    ``rows`` is how many there will be, for the windows in which drift is told from oscillation. ``state`` is all that
+    was seen, as arrays.
+    """
+
+    def __init__(
+        self, method: str, system: System, run: Run | None, parameters: Mapping[str, float], rows: int
+    ) -> None:
+        self._about = method, rows
+        self._system, self._run, self._parameters = system, run, parameters
+        self._groups = {
+            "energy": {"H": system.hamiltonian},
+            "casimirs": system.casimirs,
+            "invariants": system.invariants,
+        }
+        self._formulas = [formula for group in self._groups.values() for formula in group.values()]
+        states, quantities = np.full(len(system.coordinates), np.nan), len(self._formulas)
+        self.state: dict[str, Any] = {
+            "first": states,
+            "final": states,
+            "start": np.zeros(quantities),
+            "maxima": np.full((quantities, WINDOWS + 1), _NOTHING),
+            "exact": np.zeros(()),
+            "good": np.zeros((), dtype=np.int64),
+            "broken": np.zeros((), dtype=bool),
+        }
+
+    def see(self, t: Floats, x: Floats) -> None:
+        """Take in the next rows, times (rows,) and states (rows, DIM); those after one not finite do not count."""
+        state, good = self.state, int(self.state["good"])
+        finite = np.isfinite(x).all(axis=1)
+        count = 0 if state["broken"] else len(x) if finite.all() else int(np.argmin(finite))
+        state["broken"] = np.asarray(state["broken"] or count < len(x))
+        if count == 0:
+            return
+        t, x = t[:count], x[:count]
+        columns = {c: x[:, i] for i, c in enumerate(self._system.coordinates)}
+        values = [np.broadcast_to(a, t.shape) for a in evaluate(self._formulas, {**self._parameters, **columns})]
+        if good == 0:
+            state |= {"first": x[0].copy(), "start": np.array([v[0] for v in values])}
+        windows = _windows(np.arange(good, good + count), self._about[1])
+        scale = float(np.max(np.abs(state["first"])))
+        for k, v in enumerate(values):
+            errors, _ = errors_from(float(state["start"][k]), v, scale)
+            np.maximum.at(state["maxima"][k], windows, errors)
+        if self._run and self._run.exact:
+            off = _against_exact(self._system, self._run, self._parameters, state["first"], t, x)
+            state["exact"] = np.asarray(max(off, float(state["exact"])))
+        state |= {"final": x[-1].copy(), "good": np.asarray(good + count)}
+
+    def summary(self) -> Summary:
+        """The summary of what was seen."""
+        (method, rows), state = self._about, self.state
+        scale = float(np.max(np.abs(state["first"])))
+        found = iter([_drift(m, float(s), scale, rows) for m, s in zip(state["maxima"], state["start"], strict=True)])
+        drifts = {kind: {name: next(found) for name in group} for kind, group in self._groups.items()}
+        return Summary(
+            method=method,
+            energy=drifts["energy"]["H"],
+            casimirs=drifts["casimirs"],
+            invariants=drifts["invariants"],
+            exact=Drift(float(state["exact"]), True, math.nan) if self._run and self._run.exact else None,
+            final=tuple(state["final"].tolist()),
+            good=int(state["good"]),
+            rows=rows,
+        )
 
 
 def drift(values: Floats, scale: float = 1.0) -> Drift:
     """The drift of the values of one quantity along a trajectory."""
-    errors, relative = errors_of(values, scale)
-    growth = float("nan")
-    if len(errors) >= 2 * WINDOWS:
-        windows = [float(np.max(part)) for part in np.array_split(errors[1:], WINDOWS)]
-        growth = windows[-1] / windows[0] if windows[0] > 0 else float("nan")
-    finite = errors[np.isfinite(errors)]
-    return Drift(float(np.max(finite, initial=0.0)) if len(finite) == len(errors) else float("inf"), relative, growth)
+    errors, _ = errors_of(values, scale)
+    maxima = np.full(WINDOWS + 1, _NOTHING)
+    np.maximum.at(maxima, _windows(np.arange(len(values)), len(values)), errors)
+    return _drift(maxima, float(values[0]), scale, len(values))
+
+
+def _windows(rows: NDArray[np.int64], of: int) -> NDArray[np.int64]:
+    """The window of each row but the first, which has one of its own: `WINDOWS` parts of a run of so many rows."""
+    ends = np.cumsum([len(part) for part in np.array_split(np.arange(1, of), WINDOWS)])
+    return np.where(rows == 0, WINDOWS, np.searchsorted(ends, rows - 1, side="right"))
+
+
+def _drift(maxima: Floats, start: float, scale: float, rows: int) -> Drift:
+    first, last = float(maxima[0]), float(maxima[WINDOWS - 1])
+    usable = rows >= 2 * WINDOWS and first > 0 and last != _NOTHING
+    error = float(np.max(maxima)) if np.isfinite(maxima).all() else math.inf
+    return Drift(max(error, 0.0), _is_relative(start, scale), last / first if usable else math.nan)
 
 
 def errors_of(values: Floats, scale: float = 1.0) -> tuple[Floats, bool]:
@@ -96,9 +164,17 @@ def errors_of(values: Floats, scale: float = 1.0) -> tuple[Floats, bool]:
 
     They are absolute if that is negligible beside ``scale``, the largest coordinate.
     """
-    start = float(values[0])
-    relative = abs(start) > _NEGLIGIBLE * scale
+    return errors_from(float(values[0]), values, scale)
+
+
+def errors_from(start: float, values: Floats, scale: float) -> tuple[Floats, bool]:
+    """`errors_of` of later rows of a trajectory, given the initial value."""
+    relative = _is_relative(start, scale)
     return np.abs(values - start) / (abs(start) if relative else 1.0), relative
+
+
+def _is_relative(start: float, scale: float) -> bool:
+    return abs(start) > _NEGLIGIBLE * scale
 
 
 def exact_solution(
@@ -111,12 +187,13 @@ def exact_solution(
     return {c: np.broadcast_to(a, t.shape) for c, a in zip(run.exact, arrays, strict=True)}
 
 
-def _against_exact(system: System, run: Run, parameters: Mapping[str, float], t: Floats, x: Floats) -> Drift:
+def _against_exact(
+    system: System, run: Run, parameters: Mapping[str, float], x0: Floats, t: Floats, x: Floats
+) -> float:
     """The largest difference, relative to the largest coordinate of the closed form at that time."""
-    solution = exact_solution(system, run, parameters, x[0], t)
+    solution = exact_solution(system, run, parameters, x0, t)
     columns = [system.coordinates.index(c) for c in solution]
     expected = np.column_stack(list(solution.values()))
     scale = np.max(np.abs(expected), axis=1)
     errors = np.max(np.abs(x[:, columns] - expected), axis=1) / np.where(scale > 0, scale, 1.0)
-    errors = errors[np.isfinite(errors)]
-    return Drift(float(np.max(errors, initial=0.0)), True, float("nan"))
+    return float(np.max(errors[np.isfinite(errors)], initial=0.0))

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from phigen.cli.console import Console, heading, out, pass_console, table, verbosity
-from phigen.cli.run import Experiment, classical_states, integrated, loaded, prepared
+from phigen.cli.experiment import Experiment, loaded, prepared
 
 if TYPE_CHECKING:
     from phigen.compiler import Compilation
@@ -35,7 +35,10 @@ def command(console: Console, target: str) -> None:
     The system has a closed form that leaves to infinity in finite time. The table shows the errors of phigen's
     solvers and of RK2, with the same step, against the closed form, and the error of the Casimir.
     """
+    import numpy as np
+
     from phigen import resources, spec
+    from phigen.analysis import classical
     from phigen.api import compilation_of
 
     start = time.perf_counter()
@@ -46,11 +49,12 @@ def command(console: Console, target: str) -> None:
         compilation = compilation_of(source, order)
         solver = loaded(compilation, target, console)
         target = solver.target  # said once, if it is not what was asked for
-        trajectory, failure = integrated(solver, experiment, console)
-        if failure:
-            raise failure
+        run = experiment.run
+        trajectory = solver.integrate(experiment.initial, experiment.h, run.steps, run.stride)
         solutions[f"phigen {order}"] = trajectory.x
-    solutions[CLASSICAL.upper()] = classical_states(solver, experiment, CLASSICAL, console)
+    x0 = np.array(experiment.initial)
+    states = classical.integrate(CLASSICAL, solver.vector_field, x0, experiment.h, run.steps, run.stride)
+    solutions[CLASSICAL.upper()] = states
     _print(compilation, experiment, solver.target, trajectory.t, solutions)
     console.note(f"compiled, run and compared in {time.perf_counter() - start:.1f} s")
 

@@ -78,7 +78,7 @@ def verified(
     """The verification of a compilation with its tangent map on a run of its spec; of the spec's targets by default."""
     from phigen.analysis.verification import verify
     from phigen.api import solver_of
-    from phigen.cli.run import prepared
+    from phigen.cli.experiment import prepared
 
     spec = compilation.spec
     experiment = prepared(spec, name)
@@ -124,7 +124,7 @@ def _shown(value: float) -> str:
 
 def described(v: Verification) -> dict[str, Any]:
     """The verification as plain data; null stands for what is not finite."""
-    from phigen.cli.run import finite
+    from phigen.cli.run_summary import finite
 
     data: dict[str, Any] = finite(asdict(v))
     return {**data, "passed": not v.failures, "failures": v.failures}

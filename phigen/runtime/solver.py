@@ -77,7 +77,7 @@ class Solver:
             states = rows_along(self.backend.start(start, values), h, steps, stride, progress)
         except BackendError as error:
             trajectory = self._trajectory(error.states, row_steps(error.step, stride), h, values)
-            raise self._failure(error, h, trajectory) from error
+            raise self.failure(error, h, trajectory) from error
         return self._trajectory(states, row_steps(steps, stride), h, values)
 
     def step(self, x: ArrayLike, h: float, *, parameters: Mapping[str, float] | None = None, **more: float) -> Floats:
@@ -88,7 +88,7 @@ class Solver:
         try:
             session.advance(h, 1)
         except BackendError as error:
-            raise self._failure(error, h, None) from error
+            raise self.failure(error, h, None) from error
         return session.state()
 
     def step_tangent(
@@ -147,7 +147,7 @@ class Solver:
                 if progress:
                     progress(session.steps)
         except BackendError as error:
-            raise self._failure(error, h, self._section(found)) from error
+            raise self.failure(error, h, self._section(found)) from error
         return self._section(found)
 
     def ensemble(
@@ -163,7 +163,7 @@ class Solver:
         try:
             return self.backend.ensemble(start, h, steps, values)
         except BackendError as error:
-            raise self._failure(error, h, error.states) from error
+            raise self.failure(error, h, error.states) from error
 
     def hamiltonian(self, x: ArrayLike, *, parameters: Mapping[str, float] | None = None, **more: float) -> Floats:
         """H of the states ``x`` (…, DIM), shape (…)."""
@@ -203,7 +203,7 @@ class Solver:
         try:
             return self.backend.start(start, values)
         except BackendError as error:
-            raise self._failure(error, h, None) from error
+            raise self.failure(error, h, None) from error
 
     def _with_tangent(self, session: Session, h: float) -> Floats:
         try:
@@ -212,13 +212,13 @@ class Solver:
             hint = "compile it with tangent=True, or say tangent: true in the spec"
             raise TypeError(f"{self.interface.name} was compiled without step_tangent; {hint}") from None
         except BackendError as error:
-            raise self._failure(error, h, None) from error
+            raise self.failure(error, h, None) from error
 
     def _section(self, found: Sequence[tuple[float, Floats]]) -> Section:
         t, x = np.array([t for t, _ in found]), np.array([x for _, x in found])
         return Section(t, x.reshape(-1, self.interface.dimension), self.coordinates)
 
-    def _failure(self, error: BackendError, h: float, trajectory: Trajectory | Section | Floats | None) -> StepError:
+    def failure(self, error: BackendError, h: float, trajectory: Trajectory | Section | Floats | None) -> StepError:
         name = self.interface.name
         where = f"{name}: step {error.step} of size {h!r} failed" if error.step >= 0 else f"{name}: a step failed"
         if error.members:

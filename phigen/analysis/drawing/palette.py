@@ -74,14 +74,21 @@ _STYLE: Any = {
 }
 
 
-@contextmanager
-def _styled() -> Iterator[None]:
-    """matplotlib with our settings instead of those of the user; raises `ToolchainError` if it is not installed."""
+def require_matplotlib() -> None:
+    """Raises `ToolchainError` if it is not installed."""
     try:
-        import matplotlib as mpl
+        import matplotlib  # noqa: F401
     except ImportError:
         hint = "it is the optional extra plot: pip install 'phigen[plot]'"
         raise ToolchainError(f"figures need matplotlib, which is not installed\n  hint: {hint}") from None
+
+
+@contextmanager
+def _styled() -> Iterator[None]:
+    """matplotlib with our settings instead of those of the user."""
+    require_matplotlib()
+    import matplotlib as mpl
+
     with mpl.rc_context():
         mpl.rcdefaults()
         mpl.rcParams.update(_STYLE)

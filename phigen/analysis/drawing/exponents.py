@@ -1,0 +1,23 @@
+"""The convergence of Lyapunov exponents."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from phigen.analysis.drawing.palette import PALETTE, SERIES
+
+if TYPE_CHECKING:
+    from phigen.analysis.lyapunov import Spectrum
+
+#: The height of the panel in inches.
+HEIGHT = 2.4
+
+
+def draw_exponents(axes: Any, spectrum: Spectrum) -> None:
+    """All exponents against the time over which they were taken, the largest on top of the others."""
+    axes.axhline(0, color=PALETTE["muted"], linewidth=0.8, linestyle=(0, (1, 2)), zorder=1)
+    for values in spectrum.history.T[:0:-1]:
+        axes.plot(spectrum.times, values, color=PALETTE["leaf"], linewidth=0.9, zorder=2)
+    axes.plot(spectrum.times, spectrum.history[:, 0], color=SERIES[0], linewidth=1.4, zorder=3)
+    axes.set(xscale="log", xlabel="t", title=f"Lyapunov exponents; the largest is {spectrum.largest:.3g}")
+    axes.grid(True)

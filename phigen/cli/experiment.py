@@ -1,0 +1,95 @@
+"""The run of a spec with the values of the command line put in, and the solver for it."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from typing import TYPE_CHECKING
+
+import click
+
+from phigen.cli.console import Console
+from phigen.errors import Diagnostic, SpecError
+
+if TYPE_CHECKING:
+    from phigen.compiler import Compilation
+    from phigen.runtime.solver import Solver
+    from phigen.spec.model import Run, Spec
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """A run with the values of the command line put in."""
+
+    run: Run
+    initial: tuple[float, ...]
+    parameters: dict[str, float]
+
+    @property
+    def h(self) -> float:
+        """The step size."""
+        return float(self.run.step)
+
+    @property
+    def rows(self) -> int:
+        """How many states are stored: those of every stride-th step, and the last."""
+        return self.run.steps // self.run.stride + 1 + (self.run.steps % self.run.stride > 0)
+
+
+def prepared(
+    spec: Spec, name: str | None, step: float | None = None, steps: int | None = None, settings: Iterable[str] = ()
+) -> Experiment:
+    """The run of that name, the first by default, with changes of the command line."""
+    if not spec.runs:
+        hint = "add one under runs:, with initial, step and steps; phigen new shows how"
+        raise SpecError([Diagnostic(f"{spec.file}: the spec has no runs", hint=hint)])
+    run = spec.runs.get(name) if name else next(iter(spec.runs.values()))
+    if run is None:
+        raise click.BadParameter(f"there is no run {name!r}; there are {', '.join(spec.runs)}", param_hint="--run")
+    if step is not None:
+        if step == 0 or not math.isfinite(step):
+            raise click.BadParameter("the step must be a finite number, and not 0", param_hint="--step")
+        run = replace(run, step=Fraction(step))
+    if steps is not None:
+        run = replace(run, steps=steps, stride=min(run.stride, steps))
+    initial = dict(zip(spec.coordinates, map(float, run.initial), strict=True))
+    parameters = {p.name: float(run.parameters.get(p.name, p.value)) for p in spec.parameters}
+    for setting in settings:
+        _set(setting, initial, parameters)
+    for p in spec.parameters:
+        if p.positive and parameters[p.name] <= 0:
+            raise click.BadParameter(f"parameter {p.name} must be positive", param_hint="--set")
+    return Experiment(run, tuple(initial.values()), parameters)
+
+
+def _set(setting: str, initial: dict[str, float], parameters: dict[str, float]) -> None:
+    name, equals, text = (part.strip() for part in setting.partition("="))
+    try:
+        value = float(Fraction(text)) if "/" in text else float(text)
+    except (ValueError, ZeroDivisionError, OverflowError):
+        value = math.nan
+    if not equals or not math.isfinite(value):
+        raise click.BadParameter(f"{setting!r} is not NAME=VALUE with a number", param_hint="--set")
+    home = parameters if name in parameters else initial
+    if name not in home:
+        known = ", ".join([*parameters, *initial])
+        raise click.BadParameter(f"{name!r} is neither a parameter nor a coordinate ({known})", param_hint="--set")
+    home[name] = value
+
+
+def loaded(compilation: Compilation, target: str, console: Console) -> Solver:
+    """The solver; where auto falls back to NumPy, stderr says so."""
+    from phigen.api import chosen_target, solver_of
+
+    chosen = chosen_target(target)
+    if target == "auto" and chosen == "numpy":
+        console.note(
+            "no C compiler found: using the NumPy target, which is slower; install gcc or clang, or name one in CC"
+        )
+    start = time.perf_counter()
+    solver = solver_of(compilation, chosen)
+    console.detail(f"{compilation.spec.name}: {chosen} ready after {time.perf_counter() - start:.2f} s")
+    return solver

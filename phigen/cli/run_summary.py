@@ -1,0 +1,106 @@
+"""What ``phigen run`` tells at the end: a table for people, or plain data."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from phigen.cli.console import counted, heading, out, table
+
+if TYPE_CHECKING:
+    from phigen.analysis.lyapunov import Spectrum
+    from phigen.analysis.summary import Drift, Summary
+    from phigen.cli.recording import Recorder
+    from phigen.compiler import Compilation
+
+
+def print_summary(compilation: Compilation, recorder: Recorder, summaries: Sequence[Summary]) -> None:
+    """The table of a run: one column for each method; then crossings and exponents, if asked for."""
+    run, solver, steps = recorder.experiment.run, recorder.solver, recorder.session.steps
+    out(heading(f"{compilation.spec.name}, run {run.name}") + (f": {run.description}" if run.description else ""))
+    chosen = f"{compilation.label}, order {solver.order}, target {solver.target}"
+    out(f"  {steps} steps of {float(run.step):.9g}, t = 0 … {recorder.experiment.h * steps:.9g}; {chosen}")
+    state = recorder.session.state().tolist()
+    final = ", ".join(f"{c} = {v:.9g}" for c, v in zip(solver.coordinates, state, strict=True))
+    out(f"  final state: {final}\n")
+    for line in table(_rows(summaries), right=range(1, len(summaries) + 1)):
+        out(f"  {line}")
+    if recorder.finder:
+        count = counted(recorder.points.seen, "rising crossing")
+        out(f"\n  {count} of the section {recorder.section_text} = 0")
+    if recorder.growth and steps:
+        spectrum = recorder.growth.spectrum()
+        changed = f"the second half changed them by {spectrum.uncertainty:.1g}"
+        out(f"\n  Lyapunov exponents after t = {spectrum.t:.9g}; {changed}")
+        out(f"  {', '.join(f'{value:.4g}' for value in spectrum.exponents.tolist())};  sum {spectrum.total:.1g}")
+
+
+def _rows(summaries: Sequence[Summary]) -> list[list[str]]:
+    first = summaries[0]
+    rows = [["largest error", *(s.method for s in summaries), ""]]
+    rows.append(["energy", *(_shown(s.energy) for s in summaries), first.energy.kind])
+    if any(math.isfinite(s.energy.growth) for s in summaries):
+        growth = [f"{s.energy.growth:.3g}" if math.isfinite(s.energy.growth) else "–" for s in summaries]
+        rows.append(["  last tenth/first", *growth, "1 is no drift"])
+    for kind, noun in (("casimirs", "Casimir"), ("invariants", "invariant")):
+        for name, drift in getattr(first, kind).items():
+            rows.append([f"{noun} {name}", *(_shown(getattr(s, kind)[name]) for s in summaries), drift.kind])
+    if first.exact:
+        rows.append(["against closed form", *(_shown(s.exact) for s in summaries if s.exact), "relative"])
+    if any(s.good < s.rows for s in summaries):
+        rows.append(["finite rows", *(f"{s.good} of {s.rows}" for s in summaries), ""])
+    return rows
+
+
+def _shown(drift: Drift) -> str:
+    return f"{drift.error:.1e}" if drift.error else "0"
+
+
+def described_run(compilation: Compilation, recorder: Recorder, summaries: Sequence[Summary]) -> dict[str, Any]:
+    """The summary as plain data."""
+    from dataclasses import asdict
+
+    experiment, solver, session = recorder.experiment, recorder.solver, recorder.session
+    told = {
+        "name": compilation.spec.name,
+        "run": experiment.run.name,
+        "target": solver.target,
+        "order": solver.order,
+        "birealisation": compilation.realisation.kind if compilation.realisation else None,
+        "scheme": "splitting" if compilation.splitting else "series",
+        "exact": compilation.exact,
+        "step": experiment.h,
+        "steps": session.steps,
+        "time": experiment.h * session.steps,
+        "parameters": experiment.parameters,
+        "initial": dict(zip(solver.coordinates, experiment.initial, strict=True)),
+        "final": dict(zip(solver.coordinates, session.state().tolist(), strict=True)),
+        "methods": [asdict(s) for s in summaries],
+    }
+    if recorder.finder:
+        told["section"] = {"expression": recorder.section_text, "crossings": recorder.points.seen}
+    if recorder.growth and session.steps:
+        told["lyapunov"] = _described_spectrum(recorder.growth.spectrum())
+    return told
+
+
+def _described_spectrum(spectrum: Spectrum) -> dict[str, Any]:
+    return {
+        "exponents": spectrum.exponents.tolist(),
+        "largest": spectrum.largest,
+        "sum": spectrum.total,
+        "pairing": spectrum.pairing,
+        "uncertainty": spectrum.uncertainty,
+        "time": spectrum.t,
+        "history": {"time": spectrum.times.tolist(), "exponents": spectrum.history.tolist()},
+    }
+
+
+def finite(value: Any) -> Any:
+    """JSON has no NaN and no infinity: null stands for them."""
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, dict):
+        return {key: finite(v) for key, v in value.items()}
+    return [finite(v) for v in value] if isinstance(value, list | tuple) else value

@@ -1,0 +1,100 @@
+"""Long integrations in pieces: what came after each piece can be stored, drawn or interrupted."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from phigen.runtime.crossings import CrossingFinder
+from phigen.runtime.interface import BackendError, Floats
+from phigen.runtime.session import Session
+
+#: Seconds, steps and rows that a piece has at most, about.
+_SECONDS = 0.2
+_MOST_STEPS, _MOST_ROWS = 1 << 20, 1 << 12
+
+
+@dataclass(frozen=True)
+class Piece:
+    """What a piece of an integration gave: the stored steps and their states, and crossings of the section.
+
+    ``numbers`` (rows,), ``x`` (rows, DIM), ``crossings`` as pairs of time and state (DIM,).
+    """
+
+    numbers: NDArray[np.int64]
+    x: Floats
+    crossings: list[tuple[float, Floats]]
+
+
+def march(
+    session: Session,
+    h: float,
+    steps: int,
+    stride: int,
+    finder: CrossingFinder | None = None,
+    see_tangent: Callable[[Floats], None] | None = None,
+) -> Iterator[Piece]:
+    """Go on with a session until ``steps`` steps of size h are made, storing every ``stride``-th state and the last.
+
+    Pieces end somewhere; the rows do not depend on where. With ``see_tangent``, the derivative (DIM, DIM) of each step
+    is told. Raises `BackendError` after a piece that ends with the last good state.
+    """
+    size = 1
+    if session.steps == 0:
+        yield Piece(np.zeros(1, dtype=np.int64), session.state()[np.newaxis], [])
+    while session.steps < steps:
+        start = time.perf_counter()
+        rows: dict[int, Floats] = {}
+        crossings: list[tuple[float, Floats]] = []
+        failure = None
+        try:
+            for number, states, found in _states(
+                session, h, min(steps, session.steps + size), stride, finder, see_tangent
+            ):
+                crossings += found
+                rows |= {number + k: state for k, state in enumerate(states) if (number + k) % stride == 0}
+        except BackendError as error:
+            failure = error
+        if session.steps == steps or (failure and session.steps):
+            rows[session.steps] = session.state()
+        x = np.array(list(rows.values())).reshape(len(rows), len(session.state()))
+        yield Piece(np.array(list(rows), dtype=np.int64), x, crossings)
+        if failure:
+            raise failure
+        quick = time.perf_counter() - start < _SECONDS
+        size = min(2 * size, _MOST_STEPS, _MOST_ROWS * stride) if quick else max(1, size // 2)
+
+
+def _states(
+    session: Session,
+    h: float,
+    target: int,
+    stride: int,
+    finder: CrossingFinder | None,
+    see_tangent: Callable[[Floats], None] | None,
+) -> Iterator[tuple[int, Sequence[Floats] | Floats, list[tuple[float, Floats]]]]:
+    """The number of a step, its state and those of the steps after it, and crossings; no stored state is left out."""
+
+    def move() -> None:
+        if see_tangent:
+            see_tangent(session.advance_tangent(h))
+        else:
+            session.advance(h, 1)
+
+    if finder:
+        for states, found in finder.follow(session, target - session.steps, move):
+            yield session.steps - len(states) + 1, states, found
+        return
+    done = session.steps
+    while done < target:
+        count = 1 if see_tangent else min(target, done + stride - done % stride) - done
+        if see_tangent:
+            move()
+        else:
+            session.advance(h, count)
+        done += count
+        yield done, [session.state()], []

@@ -1,0 +1,251 @@
+"""``phigen run``: files that grow while it runs, interruptions, going on, sections, exponents, figures."""
+
+import itertools
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+import tracemalloc
+from contextlib import contextmanager, nullcontext
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from phigen import resources
+from phigen.cli.interruption import Stop
+
+SPECS = resources.bundled_specs()
+#: A run with everything: a section, exponents, a gauge.
+EVERYTHING = (SPECS / "rigid_body.yaml", "--run", "tumbling", "--lyapunov")
+
+
+@pytest.fixture(autouse=True)
+def no_comparison(monkeypatch):
+    """The classical methods are slow and not the subject here."""
+    from phigen.cli import experiment
+
+    prepared = experiment.prepared
+
+    def alone(*args, **kwargs):
+        found = prepared(*args, **kwargs)
+        return experiment.replace(found, run=experiment.replace(found.run, compare=()))
+
+    monkeypatch.setattr("phigen.cli.run.prepared", alone)
+
+
+@contextmanager
+def interrupted(pieces, steps=16):
+    """Runs are interrupted after so many pieces of work, of so many steps at most."""
+    asked = itertools.count()
+
+    class Later(Stop):
+        @property
+        def requested(self):
+            return next(asked) >= pieces
+
+        @requested.setter
+        def requested(self, value):
+            pass
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("phigen.runtime.march._MOST_STEPS", steps)
+        patch.setattr("phigen.cli.recording.interruptible", lambda: nullcontext(Later()))
+        yield
+
+
+def files(*names):
+    return [Path(name).read_bytes() for name in names]
+
+
+@pytest.mark.parametrize(
+    ("name", "target", "suffix"),
+    [("rigid_body", "c", "csv"), ("rigid_body", "numpy", "npz"), ("pendulum_euler", "numpy", "csv"),
+     ("guiding_centre", "c", "npz")],
+)  # fmt: skip
+def test_an_interrupted_run_goes_on_to_the_same_bytes(phigen, in_tmp, name, target, suffix):
+    run = ("run", SPECS / f"{name}.yaml", "-t", target, "--steps", 60, "-o", f"a.{suffix}", "--json")
+    whole = phigen(*run)
+    assert whole.exit_code == 0, whole.stderr
+    expected = files(f"a.{suffix}")
+    Path(f"a.{suffix}").unlink()
+    for pieces, resume in ((3, []), (2, ["--resume"])):
+        with interrupted(pieces, steps=7):
+            stopped = phigen(*run, *resume)
+        assert stopped.exit_code == 130, stopped.stderr
+        assert "interrupted after" in stopped.stderr
+        assert Path(f"a.{suffix}.checkpoint").exists()
+    assert 0 < json.loads(stopped.stdout)["steps"] < 60
+    done = phigen(*run, "--resume")
+    assert done.exit_code == 0, done.stderr
+    assert files(f"a.{suffix}") == expected
+    assert json.loads(done.stdout) == json.loads(whole.stdout)
+    assert sorted(p.name for p in in_tmp.iterdir()) == [f"a.{suffix}"]
+
+
+def test_sections_and_exponents_go_on_as_well(phigen, in_tmp):
+    run = ("run", *EVERYTHING, "--steps", 1500, "--section", "s.csv", "-o", "a.npz", "--plot", "f.svg", "--json")
+    whole = phigen(*run)
+    assert json.loads(whole.stdout)["section"]["crossings"] > 1
+    names = ("a.npz", "s.csv", "f.svg")
+    expected = files(*names)
+    for name in names:
+        Path(name).unlink()
+    with interrupted(15, steps=77):
+        assert phigen(*run).exit_code == 130
+    with np.load("a.npz") as stored:  # what there is can be read
+        assert 10 < len(stored["t"]) < 140
+    assert len(Path("s.csv").read_text().splitlines()) > 1
+    done = phigen(*run, "--resume")
+    assert files(*names) == expected
+    assert done.stdout == whole.stdout
+
+
+KILLED = """
+import sys
+from phigen.cli import main, recording
+from phigen.runtime import march
+recording.CHECKPOINT_SECONDS = 0.1
+march._MOST_STEPS = 200
+sys.argv[0] = "phigen"
+main()
+"""
+
+
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGKILL, -9), (signal.SIGINT, 130)])
+def test_a_killed_run_goes_on_to_the_same_bytes(phigen, in_tmp, number, code):
+    run = ["run", SPECS / "pendulum_euler.yaml", "--steps", 60_000, "-t", "numpy", "-o", "a.csv"]
+    command = [sys.executable, "-c", KILLED, *map(str, run)]
+    paths = {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+    environment = {**os.environ, **paths}
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=environment) as process:
+        deadline = time.monotonic() + 60
+        while not (Path("a.csv").exists() and Path("a.csv").stat().st_size > 2000):
+            assert process.poll() is None, process.stderr.read()
+            assert time.monotonic() < deadline
+            time.sleep(0.01)
+        process.send_signal(number)
+        process.communicate()
+    assert process.returncode == code
+    some = files("a.csv")[0]
+    assert phigen(*run, "--resume").exit_code == 0
+    resumed = files("a.csv")[0]
+    assert phigen(*run).exit_code == 0
+    assert files("a.csv")[0] == resumed
+    assert len(some) < len(resumed)
+    assert resumed.startswith(some[: some.rindex(b"\n")])
+
+
+def test_an_integration_that_fails_keeps_its_rows(phigen, in_tmp):
+    run = ("run", SPECS / "lotka_volterra.yaml", "--step", "0.01", "--steps", "100", "-o", "a.npz", "--plot", "a.png")
+    done = phigen(*run)
+    assert done.exit_code == 7
+    with np.load("a.npz") as stored:
+        assert len(stored["t"]) == 1 + 25 // 10 + 1
+        assert stored["steps"] == 25
+    assert sorted(p.name for p in in_tmp.iterdir()) == ["a.npz", "a.png"]
+
+
+def test_resuming_another_run_is_refused_and_says_why(phigen, in_tmp):
+    run = ("run", SPECS / "rigid_body.yaml", "-o", "a.csv")
+    with interrupted(3):
+        assert phigen(*run).exit_code == 130
+    kept = files("a.csv", "a.csv.checkpoint")
+    for change, said in [
+        (("--step", "0.01"), "step was 0.05 and is 0.01"),
+        (("--set", "I1=5"), "parameters was"),
+        (("--set", "x1=0.5"), "initial was"),
+        (("--order", "4"), "order was 6 and is 4"),
+        (("-t", "numpy"), "target was .c. and is .numpy."),
+        (("--run", "tumbling"), "run was 'reference' and is 'tumbling'"),
+        (("--lyapunov",), "lyapunov was False and is True"),
+    ]:
+        done = phigen(*run, *change, "--resume")
+        assert done.exit_code == 2, change
+        assert re.search(said, done.stderr)
+    assert "go on with --resume, or remove it" in phigen(*run).stderr
+    assert files("a.csv", "a.csv.checkpoint") == kept
+    Path("a.csv").write_text("t\n")
+    assert "fewer than" in phigen(*run, "--resume").stderr
+    Path("a.csv.checkpoint").write_text("nonsense")
+    assert "is not a checkpoint" in phigen(*run, "--resume").stderr
+
+
+def test_a_changed_spec_is_not_resumed(phigen, write):
+    path = write("a.yaml")
+    with interrupted(3):
+        assert phigen("run", path, "-o", "a.csv").exit_code == 130
+    path.write_text(path.read_text().replace("(q**2 + p**2)/2", "(q**2 + p**2)/2 + q**4"))
+    done = phigen("run", path, "-o", "a.csv", "--resume")
+    assert done.exit_code == 2
+    assert "the spec has changed" in done.stderr
+
+
+def test_resume_without_an_interrupted_run(phigen, write):
+    path = write("a.yaml")
+    assert "by --output or --section" in phigen("run", path, "--resume").stderr
+    assert phigen("run", path, "-o", "a.csv", "--resume").exit_code == 0  # nothing there yet: from the start
+    assert "its run is complete" in phigen("run", path, "-o", "a.csv", "--resume").stderr
+
+
+def test_memory_does_not_grow_with_the_length_of_a_run(phigen, in_tmp, monkeypatch):
+    monkeypatch.setattr("phigen.runtime.march._MOST_ROWS", 256)  # pieces are as large as time allows
+
+    def peak(steps):
+        tracemalloc.start()
+        done = phigen("run", SPECS / "harmonic_oscillator.yaml", "--steps", steps, "-o", "a.npz", "-q")
+        found = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+        assert done.exit_code == 0
+        return found
+
+    peak(1000)  # what is loaded once
+    short, long = peak(100_000), peak(400_000)
+    assert long < 1.2 * short
+
+
+def test_section_and_exponents_are_told(phigen, in_tmp):
+    done = phigen("run", *EVERYTHING, "--steps", 3000, "--section", "s.npz", "--json")
+    told = json.loads(done.stdout)
+    with np.load("s.npz") as stored:
+        assert len(stored["t"]) == told["section"]["crossings"]
+        assert np.max(np.abs(stored["x"][:, 2])) < 1e-15
+    exponents = told["lyapunov"]["exponents"]
+    assert exponents == sorted(exponents, reverse=True)
+    assert abs(told["lyapunov"]["sum"]) < 1e-10
+    assert told["lyapunov"]["history"]["time"][-1] == told["time"] == told["lyapunov"]["time"]
+    shown = phigen("run", *EVERYTHING, "--steps", 3000).stdout
+    assert "crossings of the section x3 = 0" in shown
+    assert "Lyapunov exponents after t = 300" in shown
+
+
+def test_a_section_needs_one_in_the_spec(phigen, write):
+    done = phigen("run", write("a.yaml"), "--section", "s.csv")
+    assert done.exit_code == 2
+    assert "has no section" in done.stderr
+
+
+@pytest.mark.parametrize("option", [("-o", "a.xls"), ("--section", "a.txt"), ("--plot", "a.jpg")])
+def test_files_of_other_kinds_are_refused_before_the_work(phigen, in_tmp, option):
+    done = phigen("run", "nowhere.yaml", *option)
+    assert done.exit_code == 2
+    assert "must end in" in done.stderr
+
+
+@pytest.mark.parametrize("suffix", ["png", "svg", "pdf"])
+def test_the_same_run_is_drawn_with_the_same_bytes(phigen, write, suffix):
+    path = write("a.yaml")
+    for name in ("one", "two"):
+        assert phigen("run", path, "--plot", f"{name}.{suffix}").exit_code == 0
+    assert files(f"one.{suffix}") == files(f"two.{suffix}")
+
+
+def test_figures_without_matplotlib_are_refused_before_the_work(phigen, write, monkeypatch):
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    done = phigen("run", write("a.yaml"), "--plot", "a.png", "-o", "a.csv")
+    assert done.exit_code == 6
+    assert "phigen[plot]" in done.stderr
+    assert not Path("a.csv").exists()
