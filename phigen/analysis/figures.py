@@ -86,8 +86,8 @@ def run_figure(
     methods: Mapping[str, Trajectory],
     casimirs: Mapping[str, Expression],
     sections: Mapping[str, Floats] | None = None,
-    spectrum: Spectrum | None = None,
     title: str = "",
+    spectrum: Spectrum | None = None,
 ) -> Figure:
     """All there is to see of a run on one page.
 

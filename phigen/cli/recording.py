@@ -67,6 +67,7 @@ class Recorder:
             "phigen": __version__,
             "spec": compilation.spec.source_sha256,
             "target": solver.target,
+            "method": compilation.label,
             "order": solver.order,
             "run": run.name,
             "step": experiment.h,

@@ -11,7 +11,16 @@ from phigen.analysis.drawing.error_curves import windowed_maxima
 from phigen.analysis.drawing.groups import groups
 from phigen.analysis.drawing.leaf import leaf_of, net
 from phigen.analysis.drawing.palette import PALETTE, SERIES
-from phigen.analysis.figures import error_figure, run_figure, save, section_figure, svg, trajectory_figure
+from phigen.analysis.figures import (
+    error_figure,
+    lyapunov_figure,
+    run_figure,
+    save,
+    section_figure,
+    svg,
+    trajectory_figure,
+)
+from phigen.analysis.lyapunov import Spectrum
 from phigen.errors import ToolchainError
 from phigen.runtime.trajectory import Trajectory
 from phigen.symbolic.expression import power, symbol
@@ -40,6 +49,9 @@ def test_a_run_is_drawn_on_one_page():
     sections = {"x3 = 0": spiral().x}
     figure = run_figure({"a": spiral(), "b": spiral(broken=20)}, CASIMIR, sections, "title")
     assert len(list(figure.subfigs)) == 3
+    spectrum = Spectrum(np.array([0.1, -0.1]), np.array([1.0, 2.0]), np.array([[0.3, -0.3], [0.1, -0.1]]))
+    assert len(list(run_figure({"a": spiral()}, CASIMIR, spectrum=spectrum).subfigs)) == 3
+    assert len(lyapunov_figure(spectrum).axes[0].lines) == 3
 
 
 def test_svg_is_a_function_of_what_it_shows():
