@@ -14,13 +14,12 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 95b28688ff715f91d255b0fbbf4472ec4830277ef2c9a5a582a1b7fca40646c9
+ * body-sha256: 7471bb5d8a38a4e9f19ee9d32b2513a2fa7ad3e0a6e1d2efeb4fab1e1df3c4f2
  */
 #ifndef ABLOWITZ_LADIK3_H
 #define ABLOWITZ_LADIK3_H
 
 #include <stddef.h>
-
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -47,19 +46,17 @@ typedef enum {
     ablowitz_ladik3_BAD_ARGUMENT    /* a null pointer, or a value that is not finite */
 } ablowitz_ladik3_status;
 
-/* Recent values of the unknown of the inner solve, for its starting guess. Two predictors compete: extrapolation by
-   backward differences, and a linear recurrence fitted to the last 80 values; they affect speed only. */
+/* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
+   fitted to the last 96 values. They affect speed only. */
 typedef struct {
-    int rows;  /* rows of lag in use */
-    int guess; /* how many of them the extrapolation adds up */
-    int count; /* values in past */
-    int slow;  /* how many of the last steps took more than one iteration */
-    int trained; /* whether weight is set */
-    double lag[8][ablowitz_ladik3_DIM]; /* backward differences, order by order */
-    double past[160][ablowitz_ladik3_DIM];   /* values, the latest last */
-    double weight[16][ablowitz_ladik3_DIM]; /* of past values, the latest first */
-    double predicted[2][ablowitz_ladik3_DIM]; /* what the two predictors say of the next value */
-    double error[2];                     /* their recent errors */
+    int count;    /* values in past */
+    int order;    /* how many of them the extrapolation uses */
+    int fits;     /* how often weight has been fitted */
+    int fitting;  /* whether the recurrence is the better guess */
+    int slow;     /* how many of the last steps took more than one iteration */
+    int patience; /* how many of those before the recurrence is fitted again */
+    double past[192][ablowitz_ladik3_DIM]; /* values, the latest last */
+    double weight[32][ablowitz_ladik3_DIM][1]; /* of past values, the latest first, for the next value */
 } ablowitz_ladik3_memory;
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with ablowitz_ladik3_init. */

@@ -13,13 +13,12 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: ed96aeb8152807083d078b62333923cffb6bfc741c035cccce6f2b0c9242eedc
+ * body-sha256: e30889c1dad9aad818818626630e6435f59259942a653fe3c0858741a1303a55
  */
 #ifndef CHARGED_PARTICLE_H
 #define CHARGED_PARTICLE_H
 
 #include <stddef.h>
-
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -46,19 +45,17 @@ typedef enum {
     charged_particle_BAD_ARGUMENT    /* a null pointer, or a value that is not finite */
 } charged_particle_status;
 
-/* Recent values of the unknown of the inner solve, for its starting guess. Two predictors compete: extrapolation by
-   backward differences, and a linear recurrence fitted to the last 80 values; they affect speed only. */
+/* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
+   fitted to the last 96 values. They affect speed only. */
 typedef struct {
-    int rows;  /* rows of lag in use */
-    int guess; /* how many of them the extrapolation adds up */
-    int count; /* values in past */
-    int slow;  /* how many of the last steps took more than one iteration */
-    int trained; /* whether weight is set */
-    double lag[8][charged_particle_DIM]; /* backward differences, order by order */
-    double past[160][charged_particle_DIM];   /* values, the latest last */
-    double weight[16][charged_particle_DIM]; /* of past values, the latest first */
-    double predicted[2][charged_particle_DIM]; /* what the two predictors say of the next value */
-    double error[2];                     /* their recent errors */
+    int count;    /* values in past */
+    int order;    /* how many of them the extrapolation uses */
+    int fits;     /* how often weight has been fitted */
+    int fitting;  /* whether the recurrence is the better guess */
+    int slow;     /* how many of the last steps took more than one iteration */
+    int patience; /* how many of those before the recurrence is fitted again */
+    double past[192][charged_particle_DIM]; /* values, the latest last */
+    double weight[32][charged_particle_DIM][1]; /* of past values, the latest first, for the next value */
 } charged_particle_memory;
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with charged_particle_init. */

@@ -13,12 +13,13 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: ea907c168f21a0ed215f5751f8bfd322badf2d4be341af084dc80b592f97c8ec
+ * body-sha256: 21886937c4ad3b58a1f060d101b8a67b8c75440a0a0d38ae51025751f8f56664
  */
 #include "engel_geodesics.h"
 
 #include <float.h>
 #include <math.h>
+#include <stdint.h>
 #include <string.h>
 
 const engel_geodesics_params engel_geodesics_default_params = { 0 };
@@ -184,119 +185,128 @@ static int engel_geodesics_solve(double matrix[16], double side[4])
     return 1;
 }
 
-/* Keep the backward differences of a vector that varies slowly from step to step (y - x), and choose how
-   many of them to extrapolate with next time: the first difference left out estimates the error of the guess. */
-static void engel_geodesics_difference(engel_geodesics_memory *memory, const double value[4])
+/* The guess for the next value (y), from earlier ones; 0 if there are none. */
+static int engel_geodesics_predict(const engel_geodesics_memory *memory, double value[4])
 {
-    double row[4], least = HUGE_VAL;
-    const int rows = memory->rows < 8 ? memory->rows + 1 : 8;
-    memcpy(row, value, sizeof row);
-    for (int k = 0; k < rows; ++k) {
-        double size = 0.0;
-        for (int i = 0; i < 4; ++i) {
-            const double before = k < memory->rows ? memory->lag[k][i] : 0.0;
-            memory->lag[k][i] = row[i];
-            size += fabs(row[i]);
-            row[i] -= before;
+    const int last = memory->count - 1;
+    double odd[4] = { 0.0 }, binomial = -1.0;
+    memset(value, 0, 4 * sizeof value[0]);
+    if (memory->fitting) {
+        for (int k = 0; k < 32; k += 2)
+            for (int i = 0; i < 4; ++i) {
+                value[i] += memory->weight[k][i][0] * memory->past[last - k][i];
+                odd[i] += memory->weight[k + 1][i][0] * memory->past[last - 1 - k][i];
+            }
+        for (int i = 0; i < 4; ++i) value[i] += odd[i];
+    } else {
+        for (int k = 0; k < memory->order && k <= last; ++k) {
+            binomial *= -(double)(memory->order - k) / (k + 1);
+            for (int i = 0; i < 4; ++i) value[i] += binomial * memory->past[last - k][i];
         }
+    }
+    return last >= 0;
+}
+
+/* Choose the guess that would have been best for a value that took several iterations. */
+static void engel_geodesics_judge(engel_geodesics_memory *memory, const double value[4])
+{
+    double row[8 + 1][4], guess[4], least = HUGE_VAL, fitted = HUGE_VAL;
+    const int rows = memory->count < 8 ? memory->count : 8;
+    memcpy(row[0], value, sizeof row[0]);
+    for (int k = 0; k < rows; ++k) memcpy(row[k + 1], memory->past[memory->count - 1 - k], sizeof row[0]);
+    for (int order = 1; order <= rows; ++order) { /* row[0] becomes the backward difference of this order */
+        double size = 0.0;
+        for (int k = 0; k <= rows - order; ++k)
+            for (int i = 0; i < 4; ++i) row[k][i] -= row[k + 1][i];
+        for (int i = 0; i < 4; ++i) size += fabs(row[0][i]);
         if (size < least) {
             least = size;
-            memory->guess = k;
+            memory->order = order;
         }
     }
-    memory->rows = rows;
-}
-
-/* The guess of the better predictor; zero without a history. Both are kept, to be judged by the solved value. */
-static void engel_geodesics_predict(engel_geodesics_memory *memory, double value[4])
-{
-    double(*guess)[4] = memory->predicted;
-    memset(memory->predicted, 0, sizeof memory->predicted);
-    for (int k = 0; k < memory->guess; ++k)
-        for (int i = 0; i < 4; ++i) guess[0][i] += memory->lag[k][i];
-    if (memory->trained) {
-        const int last = memory->count - 1;
-        double odd[4] = { 0.0 };
-        for (int k = 0; k < 16; k += 2)
-            for (int i = 0; i < 4; ++i) {
-                guess[1][i] += memory->weight[k][i] * memory->past[last - k][i];
-                odd[i] += memory->weight[k + 1][i] * memory->past[last - 1 - k][i];
-            }
-        for (int i = 0; i < 4; ++i) guess[1][i] += odd[i];
+    memory->fitting = memory->fits > 0;
+    if (memory->fitting && engel_geodesics_predict(memory, guess)) {
+        fitted = 0.0;
+        for (int i = 0; i < 4; ++i) fitted += fabs(value[i] - guess[i]);
     }
-    memcpy(value, guess[memory->trained && memory->error[1] <= memory->error[0]], 4 * sizeof value[0]);
+    memory->fitting = memory->fits > 0 && fitted <= least;
+    if (memory->order == 0) memory->order = 1;
 }
 
-/* Fit the recurrence value[m] = sum of weight[k] * value[m - 1 - k] to the history, component by component: ridge
-   least squares by modified Gram-Schmidt, the ridge at the level of rounding. */
+/* Fit the recurrences value[m + l] = sum of weight[k][..][l] * value[m - 1 - k], l = 0 ... 8 - 1, to the history,
+   component by component: ridge least squares by modified Gram-Schmidt, the ridge at the level of rounding. The last
+   8 columns of q are the right-hand sides. */
 static void engel_geodesics_train(engel_geodesics_memory *memory, int component)
 {
-    enum { ROWS = 80 - 16, ALL = 80 };
-    double q[16][ALL], r[16][16], b[ALL] = { 0.0 }, largest = 0.0;
-    const int first = memory->count - 80;
+    enum { WINDOW = 32, AHEAD = 8, ROWS = 96 - WINDOW - AHEAD + 1 };
+    double q[ROWS + WINDOW][WINDOW + AHEAD], r[WINDOW][WINDOW + AHEAD], largest = 0.0;
     memset(q, 0, sizeof q);
-    for (int i = 0; i < 80; ++i)
-        if (fabs(memory->past[first + i][component]) > largest) largest = fabs(memory->past[first + i][component]);
-    for (int k = 0; k < 16; ++k) {
-        for (int i = 0; i < ROWS; ++i) q[k][i] = memory->past[first + i + 16 - 1 - k][component];
-        q[k][ROWS + k] = 1e-13 * largest;
-    }
-    for (int i = 0; i < ROWS; ++i) b[i] = memory->past[first + i + 16][component];
-    for (int k = 0; k < 16; ++k) {
-        double norm = 0.0, along = 0.0;
-        for (int i = 0; i < ALL; ++i) norm += q[k][i] * q[k][i];
-        r[k][k] = sqrt(norm);
-        for (int i = 0; i < ALL; ++i) q[k][i] = norm > 0.0 ? q[k][i] / r[k][k] : 0.0;
-        for (int j = k + 1; j < 16; ++j) {
-            double dot = 0.0;
-            for (int i = 0; i < ALL; ++i) dot += q[k][i] * q[j][i];
-            r[k][j] = dot;
-            for (int i = 0; i < ALL; ++i) q[j][i] -= dot * q[k][i];
+    memset(r, 0, sizeof r);
+    for (int i = 0; i < ROWS; ++i) {
+        for (int j = 0; j < WINDOW + AHEAD; ++j) {
+            const int place = j < WINDOW ? WINDOW - 1 - j : j;
+            q[i][j] = memory->past[memory->count - 96 + i + place][component];
         }
-        for (int i = 0; i < ALL; ++i) along += q[k][i] * b[i];
-        memory->weight[k][component] = along;
-        for (int i = 0; i < ALL; ++i) b[i] -= along * q[k][i];
+        if (fabs(q[i][0]) > largest) largest = fabs(q[i][0]);
     }
-    for (int k = 16 - 1; k >= 0; --k) {
-        double sum = memory->weight[k][component];
-        for (int j = k + 1; j < 16; ++j) sum -= r[k][j] * memory->weight[j][component];
-        memory->weight[k][component] = r[k][k] > 0.0 ? sum / r[k][k] : 0.0;
+    for (int k = 0; k < WINDOW; ++k) q[ROWS + k][k] = 1e-13 * largest;
+    for (int k = 0; k < WINDOW; ++k) {
+        for (int i = 0; i < ROWS + WINDOW; ++i)
+            for (int j = k; j < WINDOW + AHEAD; ++j) r[k][j] += q[i][k] * q[i][j];
+        const double scale = r[k][k] > 0.0 ? 1.0 / r[k][k] : 0.0;
+        for (int j = k + 1; j < WINDOW + AHEAD; ++j) r[k][j] *= scale;
+        for (int i = 0; i < ROWS + WINDOW; ++i)
+            for (int j = k + 1; j < WINDOW + AHEAD; ++j) q[i][j] -= q[i][k] * r[k][j];
     }
+    for (int l = 0; l < AHEAD; ++l)
+        for (int k = WINDOW - 1; k >= 0; --k) {
+            double sum = r[k][WINDOW + l];
+            for (int j = k + 1; j < WINDOW; ++j) sum -= r[k][j] * memory->weight[j][component][l];
+            memory->weight[k][component][l] = sum;
+        }
 }
 
-/* Take in the solved value: update both predictors and their errors, and fit the recurrence when steps have been
-   taking several iterations. */
-static void engel_geodesics_remember(engel_geodesics_memory *memory, const double value[4], int iterations)
+/* Add a value to the history. */
+static void engel_geodesics_record(engel_geodesics_memory *memory, const double value[4])
 {
-    for (int kind = 0; kind < 2; ++kind) {
-        double error = 0.0;
-        for (int i = 0; i < 4; ++i) error += fabs(value[i] - memory->predicted[kind][i]);
-        memory->error[kind] = fmax(0.8 * memory->error[kind], error);
-    }
-    engel_geodesics_difference(memory, value);
-    if (memory->count == 160) {
-        memmove(memory->past, memory->past + 160 - 80, 80 * sizeof memory->past[0]);
-        memory->count = 80;
+    if (memory->count == 192) {
+        memmove(memory->past, memory->past + 192 - 96, 96 * sizeof memory->past[0]);
+        memory->count = 96;
     }
     memcpy(memory->past[memory->count++], value, 4 * sizeof value[0]);
-    memory->slow = iterations > 1 ? memory->slow + 1 : 0;
-    if (memory->slow >= 80 && memory->count >= 80) {
-        for (int i = 0; i < 4; ++i) engel_geodesics_train(memory, i);
-        memory->trained = 1;
-        memory->error[1] = 0.0;
-        memory->slow = -80;
-    }
 }
 
-/* x + change in compensated arithmetic. 0, and x as before, if the sum is not finite. */
-static int engel_geodesics_advance(engel_geodesics_solver *s, const double change[4])
+/* Fit the recurrence to the last values; with every time, wait longer before it is done again. */
+static void engel_geodesics_fit(engel_geodesics_memory *memory)
+{
+    for (int i = 0; i < 4; ++i) engel_geodesics_train(memory, i);
+    memory->fitting = 1;
+    ++memory->fits;
+    memory->slow = 0;
+    memory->patience = memory->patience < 10000 ? 2 * memory->patience + 96 : 20000;
+}
+
+/* Take in the solved value: what took one iteration needs no better guess. */
+static void engel_geodesics_remember(engel_geodesics_memory *memory, const double value[4], int iterations)
+{
+    if (iterations > 1) engel_geodesics_judge(memory, value);
+    engel_geodesics_record(memory, value);
+    memory->slow = iterations > 1 ? memory->slow + 1 : 0;
+    if (memory->slow > memory->patience && memory->count >= 96) engel_geodesics_fit(memory);
+}
+
+/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last
+   bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the
+   sum is not finite. */
+static int engel_geodesics_advance(engel_geodesics_solver *s, const double change[4], const double correction[4])
 {
     double x[4], carry[4];
     for (int i = 0; i < 4; ++i) {
-        const double addend = change[i] + s->carry[i];
-        x[i] = s->x[i] + addend;
-        const double added = x[i] - s->x[i];
-        carry[i] = (s->x[i] - (x[i] - added)) + (addend - added);
+        const double sum = s->x[i] + change[i], added = sum - s->x[i];
+        const double lost = (s->x[i] - (sum - added)) + (change[i] - added);
+        const double small = lost + (s->carry[i] + correction[i]);
+        x[i] = sum + small;
+        carry[i] = small - (x[i] - sum);
         if (!isfinite(x[i])) return 0;
     }
     memcpy(s->x, x, sizeof x);
@@ -320,20 +330,19 @@ static double engel_geodesics_size(const double y[4], const double delta[4])
 
 /* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the extrapolated guess, and advance. The
    increment is corrected to first order by the last Newton correction, so that correction costs no evaluation:
-   a correction is accepted when the error that remains after it, quadratic in it, is below 1e-18. */
+   a correction is accepted when the error that remains after it, quadratic in it, is below 1e-20. */
 static engel_geodesics_status engel_geodesics_attempt(engel_geodesics_solver *s, int stage)
 {
     const double *coef = s->coef[stage];
     engel_geodesics_memory *memory = &s->memory[stage];
     double y[4], delta[4], displacement[4], increment[4];
     double jacobian[16], increment_jacobian[16];
-    engel_geodesics_predict(memory, y);
-    for (int i = 0; i < 4; ++i) y[i] += s->x[i];
+    if (!engel_geodesics_predict(memory, y)) memcpy(y, s->x, sizeof y);
     double previous = HUGE_VAL;
     for (int iteration = 0; iteration < 20; ++iteration) {
         engel_geodesics_linearise(coef, y, displacement, increment, jacobian, increment_jacobian);
         ++s->evaluations;
-        for (int i = 0; i < 4; ++i) delta[i] = ((y[i] - s->x[i]) - s->carry[i]) + displacement[i];
+        for (int i = 0; i < 4; ++i) delta[i] = ((y[i] - s->x[i]) + displacement[i]) - s->carry[i];
         const int regular = engel_geodesics_solve(jacobian, delta);
         const double size = engel_geodesics_size(y, delta);
         if (!isfinite(size)) return engel_geodesics_NOT_FINITE;
@@ -342,14 +351,12 @@ static engel_geodesics_status engel_geodesics_attempt(engel_geodesics_solver *s,
         const double growth = size / (previous * previous);
         const double remaining = size * size * (growth > 1.0 ? growth : 1.0);
         /* The second test: corrections no longer shrink, the solve has reached the level of rounding. */
-        if (remaining <= 1e-18 || (previous < 1e-8 && size > 0.25 * previous)) {
-            double offset[4];
-            for (int i = 0; i < 4; ++i) {
-                offset[i] = y[i] - s->x[i];
-                for (int j = 0; j < 4; ++j) increment[i] -= increment_jacobian[i * 4 + j] * delta[j];
-            }
-            if (!engel_geodesics_advance(s, increment)) return engel_geodesics_NOT_FINITE;
-            engel_geodesics_remember(memory, offset, iteration + 1);
+        if (remaining <= 1e-20 || (previous < 1e-8 && size > 0.25 * previous)) {
+            double correction[4] = { 0.0 };
+            for (int i = 0; i < 4; ++i)
+                for (int j = 0; j < 4; ++j) correction[i] -= increment_jacobian[i * 4 + j] * delta[j];
+            if (!engel_geodesics_advance(s, increment, correction)) return engel_geodesics_NOT_FINITE;
+            engel_geodesics_remember(memory, y, iteration + 1);
             return engel_geodesics_OK;
         }
         previous = size;
@@ -366,7 +373,7 @@ static engel_geodesics_status engel_geodesics_stages(engel_geodesics_solver *s)
     memcpy(carry, s->carry, sizeof carry);
     for (int stage = 0; stage < 1; ++stage) {
         engel_geodesics_status status = engel_geodesics_attempt(s, stage);
-        if (status != engel_geodesics_OK && s->memory[stage].rows > 0) {
+        if (status != engel_geodesics_OK && s->memory[stage].count > 0) {
             memset(&s->memory[stage], 0, sizeof s->memory[stage]);
             status = engel_geodesics_attempt(s, stage);
         }
@@ -406,11 +413,393 @@ engel_geodesics_status engel_geodesics_step(engel_geodesics_solver *s, double h)
     return status;
 }
 
+/*
+ * Eight at a time: below, the formulas of a step are evaluated for 8 steps of a trajectory, or members of an
+ * ensemble, at once. Compilers make vector instructions of the loops over lanes.
+ */
+enum { engel_geodesics_LANES = 8 };
+
+#if defined(__GNUC__)
+typedef double engel_geodesics_lanes[engel_geodesics_LANES] __attribute__((aligned(64))); /* a value in each lane */
+#else
+typedef double engel_geodesics_lanes[engel_geodesics_LANES];
+#endif
+
+#if defined(__clang__)
+#define engel_geodesics_EACH_LANE _Pragma("clang loop vectorize(assume_safety)")
+#pragma clang diagnostic ignored "-Wpass-failed"
+#elif defined(__GNUC__)
+#define engel_geodesics_EACH_LANE _Pragma("GCC ivdep") _Pragma("GCC unroll 1")
+#else
+#define engel_geodesics_EACH_LANE
+#endif
+
+/* What all blocks share: coefficients, the same in each lane, and the recurrences by which they are foreseen. */
+typedef struct {
+    int fits[1]; /* the fit that weight is of; -1 for none */
+    engel_geodesics_lanes coef[1][3], weight[1][32][4];
+} engel_geodesics_table;
+
+/* A stage in all lanes, linear around y: a residual r of alpha(y) = x takes inverse r from y and gain r from the
+   increment. */
+typedef struct {
+    engel_geodesics_lanes y[4], displacement[4], increment[4], residual[4];
+    engel_geodesics_lanes inverse[16], slope[16], gain[16];
+} engel_geodesics_lines;
+
+/* engel_geodesics_linearise in all lanes. */
+static void engel_geodesics_linearise_lanes(engel_geodesics_lanes coef[restrict 3],
+                                            engel_geodesics_lanes y[restrict 4],
+                                            engel_geodesics_lanes displacement[restrict 4],
+                                            engel_geodesics_lanes increment[restrict 4],
+                                            engel_geodesics_lanes jacobian[restrict 16],
+                                            engel_geodesics_lanes increment_jacobian[restrict 16])
+{
+    engel_geodesics_EACH_LANE
+    for (int lane = 0; lane < engel_geodesics_LANES; ++lane) {
+        const double h1 = y[0][lane];
+        const double h2 = y[1][lane];
+        const double h3 = y[2][lane];
+        const double h4 = y[3][lane];
+        const double t1 = coef[0][lane] + coef[1][lane] * (h3 * h3);
+        const double p_h2 = h2 * t1;
+        const double p_h1 = h1 * t1;
+        const double t2 = h4 * p_h1;
+        const double t3 = coef[1][lane] * (h1 * h1) + coef[1][lane] * (h2 * h2);
+        const double p_h3 = h3 * t3;
+        const double t4 = h4 * p_h3 + h3 * p_h2;
+        const double t5 = h3 * p_h1;
+        const double t6 = h4 * p_h2;
+        const double t7 = coef[2][lane] * (h1 * h3);
+        const double t8 = h4 * t7;
+        const double t9 = 0.5 * t8;
+        const double t10 = 0.5 * h3;
+        const double t11 = (-1.0 / 12.0) * t2 - t10;
+        const double t12 = coef[2][lane] * (h2 * h3);
+        const double t13 = h4 * t12;
+        const double t14 = h4 * t3;
+        const double t15 = t10 + 1.0 / 12.0 * (t2 + t2);
+        const double t16 = 0.5 * p_h1;
+        const double t17 = h4 * t1;
+        const double t18 = h3 * t1;
+        displacement[0][lane] = (-1.0 / 12.0) * (p_h2 * t2) - 0.5 * t4;
+        displacement[1][lane] = 0.5 * t5 + 1.0 / 12.0 * (p_h1 * t2);
+        displacement[2][lane] = 0.5 * t2;
+        displacement[3][lane] = 0.0;
+        increment[0][lane] = t4;
+        increment[1][lane] = -t5;
+        increment[2][lane] = -t2;
+        increment[3][lane] = 0.0;
+        jacobian[0][lane] = 1.0 + ((-1.0 / 12.0) * (t1 * t6) - t9);
+        jacobian[1][lane] = t1 * t11 - 0.5 * t13;
+        jacobian[2][lane] = t12 * t11 - 1.0 / 12.0 * (t7 * t6) - 0.5 * t14 - 0.5 * p_h2;
+        jacobian[3][lane] = (-1.0 / 12.0) * (p_h1 * p_h2) - 0.5 * p_h3;
+        jacobian[4][lane] = t1 * t15;
+        jacobian[5][lane] = 1.0;
+        jacobian[6][lane] = t16 + t7 * t15;
+        jacobian[7][lane] = 1.0 / 12.0 * (p_h1 * p_h1);
+        jacobian[8][lane] = 0.5 * t17;
+        jacobian[9][lane] = 0.0;
+        jacobian[10][lane] = 1.0 + t9;
+        jacobian[11][lane] = t16;
+        jacobian[12][lane] = 0.0;
+        jacobian[13][lane] = 0.0;
+        jacobian[14][lane] = 0.0;
+        jacobian[15][lane] = 1.0;
+        increment_jacobian[0][lane] = t8;
+        increment_jacobian[1][lane] = t13 + t18;
+        increment_jacobian[2][lane] = p_h2 + (h3 * t12 + t14);
+        increment_jacobian[3][lane] = p_h3;
+        increment_jacobian[4][lane] = -t18;
+        increment_jacobian[5][lane] = 0.0;
+        increment_jacobian[6][lane] = -(h3 * t7 + p_h1);
+        increment_jacobian[7][lane] = 0.0;
+        increment_jacobian[8][lane] = -t17;
+        increment_jacobian[9][lane] = 0.0;
+        increment_jacobian[10][lane] = -t8;
+        increment_jacobian[11][lane] = -p_h1;
+        increment_jacobian[12][lane] = 0.0;
+        increment_jacobian[13][lane] = 0.0;
+        increment_jacobian[14][lane] = 0.0;
+        increment_jacobian[15][lane] = 0.0;
+    }
+}
+
+/* engel_geodesics_invert in all lanes. */
+static void engel_geodesics_invert_lanes(engel_geodesics_lanes matrix[restrict 16],
+                                         engel_geodesics_lanes slope[restrict 16],
+                                         engel_geodesics_lanes inverse[restrict 16],
+                                         engel_geodesics_lanes gain[restrict 16],
+                                         engel_geodesics_lanes reciprocal[restrict 4])
+{
+    engel_geodesics_EACH_LANE
+    for (int lane = 0; lane < engel_geodesics_LANES; ++lane) {
+        const double t1 = 1.0 / matrix[0][lane];
+        const double t2 = matrix[1][lane] * t1;
+        const double t3 = 1.0 / (matrix[5][lane] - matrix[4][lane] * t2);
+        const double t4 = matrix[4][lane] * t1 * t3;
+        const double t5 = matrix[2][lane] * t1;
+        const double t6 = (matrix[6][lane] - matrix[4][lane] * t5) * t3;
+        const double t7 = t5 - t2 * t6;
+        const double t8 = matrix[9][lane] - matrix[8][lane] * t2;
+        const double t9 = 1.0 / (matrix[10][lane] - matrix[8][lane] * t5 - t8 * t6);
+        const double t10 = (t8 * t4 - matrix[8][lane] * t1) * t9;
+        const double t11 = matrix[3][lane] * t1;
+        const double t12 = (matrix[7][lane] - matrix[4][lane] * t11) * t3;
+        const double t13 = (matrix[11][lane] - matrix[8][lane] * t11 - t8 * t12) * t9;
+        const double t14 = t11 - t2 * t12 - t7 * t13;
+        const double t15 = matrix[13][lane] - matrix[12][lane] * t2;
+        const double t16 = matrix[14][lane] - matrix[12][lane] * t5 - t15 * t6;
+        const double t17 = 1.0 / (matrix[15][lane] - matrix[12][lane] * t11 - t15 * t12 - t16 * t13);
+        const double t18 = (t15 * t4 - matrix[12][lane] * t1 - t16 * t10) * t17;
+        const double t19 = t1 + t2 * t4 - t7 * t10 - t14 * t18;
+        const double t20 = t8 * t3 * t9;
+        const double t21 = (t16 * t20 - t15 * t3) * t17;
+        const double t22 = t7 * t20 - t2 * t3 - t14 * t21;
+        const double t23 = t16 * t9 * t17;
+        const double t24 = t14 * t23 - t7 * t9;
+        const double t25 = t14 * t17;
+        const double t26 = t12 - t6 * t13;
+        const double t27 = t4 + t6 * t10 + t26 * t18;
+        const double t28 = t3 + t6 * t20 - t26 * t21;
+        const double t29 = t26 * t23 - t6 * t9;
+        const double t30 = t26 * t17;
+        const double t31 = t10 - t13 * t18;
+        const double t32 = t20 + t13 * t21;
+        const double t33 = t9 + t13 * t23;
+        const double t34 = t13 * t17;
+        inverse[0][lane] = t19;
+        inverse[1][lane] = t22;
+        inverse[2][lane] = t24;
+        inverse[3][lane] = -t25;
+        inverse[4][lane] = -t27;
+        inverse[5][lane] = t28;
+        inverse[6][lane] = t29;
+        inverse[7][lane] = -t30;
+        inverse[8][lane] = t31;
+        inverse[9][lane] = -t32;
+        inverse[10][lane] = t33;
+        inverse[11][lane] = -t34;
+        inverse[12][lane] = t18;
+        inverse[13][lane] = t21;
+        inverse[14][lane] = -t23;
+        inverse[15][lane] = t17;
+        gain[0][lane] = slope[0][lane] * t19 - slope[1][lane] * t27 + (slope[3][lane] * t18 + slope[2][lane] * t31);
+        gain[1][lane] = slope[0][lane] * t22 + slope[1][lane] * t28 + (slope[3][lane] * t21 - slope[2][lane] * t32);
+        gain[2][lane] = slope[2][lane] * t33 - slope[3][lane] * t23 + (slope[0][lane] * t24 + slope[1][lane] * t29);
+        gain[3][lane] = slope[3][lane] * t17 - slope[2][lane] * t34 - (slope[1][lane] * t30 + slope[0][lane] * t25);
+        gain[4][lane] = slope[4][lane] * t19 - slope[5][lane] * t27 + (slope[7][lane] * t18 + slope[6][lane] * t31);
+        gain[5][lane] = slope[7][lane] * t21 - slope[6][lane] * t32 + (slope[5][lane] * t28 + slope[4][lane] * t22);
+        gain[6][lane] = slope[6][lane] * t33 - slope[7][lane] * t23 + (slope[5][lane] * t29 + slope[4][lane] * t24);
+        gain[7][lane] = slope[7][lane] * t17 - slope[6][lane] * t34 - (slope[4][lane] * t25 + slope[5][lane] * t30);
+        gain[8][lane] = slope[11][lane] * t18 + slope[10][lane] * t31 + (slope[8][lane] * t19 - slope[9][lane] * t27);
+        gain[9][lane] = slope[9][lane] * t28 + slope[8][lane] * t22 + (slope[11][lane] * t21 - slope[10][lane] * t32);
+        gain[10][lane] = slope[10][lane] * t33 - slope[11][lane] * t23 + (slope[9][lane] * t29 + slope[8][lane] * t24);
+        gain[11][lane] = slope[11][lane] * t17 - slope[10][lane] * t34 - (slope[9][lane] * t30 + slope[8][lane] * t25);
+        gain[12][lane] = slope[15][lane] * t18 + slope[14][lane] * t31 + (slope[12][lane] * t19 - slope[13][lane] * t27);
+        gain[13][lane] = slope[13][lane] * t28 + slope[12][lane] * t22 + (slope[15][lane] * t21 - slope[14][lane] * t32);
+        gain[14][lane] = slope[14][lane] * t33 - slope[15][lane] * t23 + (slope[13][lane] * t29 + slope[12][lane] * t24);
+        gain[15][lane] = slope[15][lane] * t17 - slope[14][lane] * t34 - (slope[12][lane] * t25 + slope[13][lane] * t30);
+        reciprocal[0][lane] = t1;
+        reciprocal[1][lane] = t3;
+        reciprocal[2][lane] = t9;
+        reciprocal[3][lane] = t17;
+    }
+}
+
+/* Everything about a stage at the points y. The matrices are I + O(h): where a pivot is far from 1, all is infinite. */
+static void engel_geodesics_tabulate(engel_geodesics_lanes coef[restrict], engel_geodesics_lines *line)
+{
+    engel_geodesics_lanes jacobian[16], reciprocal[4];
+    engel_geodesics_linearise_lanes(coef, line->y, line->displacement, line->increment, jacobian, line->slope);
+    engel_geodesics_invert_lanes(jacobian, line->slope, line->inverse, line->gain, reciprocal);
+    for (int i = 0; i < 4; ++i) {
+        engel_geodesics_EACH_LANE
+        for (int lane = 0; lane < engel_geodesics_LANES; ++lane)
+            line->inverse[i][lane] += fabs(reciprocal[i][lane]) < 1e3 ? 0.0 : HUGE_VAL;
+    }
+}
+
+/* engel_geodesics_size in all lanes, summed over the components. */
+static void engel_geodesics_sizes(engel_geodesics_lanes y[restrict 4], engel_geodesics_lanes delta[restrict 4],
+    engel_geodesics_lanes size)
+{
+    engel_geodesics_lanes norm = { 0.0 };
+    memset(size, 0, engel_geodesics_LANES * sizeof size[0]);
+    for (int i = 0; i < 4; ++i)
+        for (int lane = 0; lane < engel_geodesics_LANES; ++lane)
+            norm[lane] = 1e-6 * fabs(y[i][lane]) > norm[lane] ? 1e-6 * fabs(y[i][lane]) : norm[lane];
+    for (int i = 0; i < 4; ++i) {
+        engel_geodesics_EACH_LANE
+        for (int lane = 0; lane < engel_geodesics_LANES; ++lane)
+            size[lane] += fabs(delta[i][lane]) / (fabs(y[i][lane]) + norm[lane] + DBL_MIN);
+    }
+}
+
+/* The steps of a block one after the other, each along the lines of its lane. As X, the state with its carry, gains
+   increment - gain residual, the next residual follows from this one; X itself is added up apart. */
+static void engel_geodesics_chain(engel_geodesics_lines line[1], double x[4], double carry[4])
+{
+    double residual[4], sum[4], small[4];
+    for (int i = 0; i < 4; ++i) {
+        residual[i] = ((line->y[i][0] - x[i]) + line->displacement[i][0]) - carry[i];
+        sum[i] = x[i];
+        small[i] = carry[i];
+    }
+    for (int k = 0; k < 1 * engel_geodesics_LANES; ++k) {
+        const int lane = k / 1, after = (k + 1) / 1 % engel_geodesics_LANES;
+        engel_geodesics_lines *at = &line[k % 1], *next = &line[(k + 1) % 1];
+        double correction[4] = { 0.0 };
+        for (int i = 0; i < 4; ++i) {
+            at->residual[i][lane] = residual[i];
+            for (int j = 0; j < 4; ++j) correction[i] -= at->gain[i * 4 + j][lane] * residual[j];
+        }
+        for (int i = 0; i < 4; ++i) {
+            const double change = at->increment[i][lane], total = sum[i] + change, added = total - sum[i];
+            const double turn = (next->displacement[i][after] - at->displacement[i][lane]) - change;
+            residual[i] = ((next->y[i][after] - at->y[i][lane]) + turn) + (residual[i] - correction[i]);
+            small[i] += ((sum[i] - (total - added)) + (change - added)) + correction[i];
+            sum[i] = total;
+        }
+    }
+    for (int i = 0; i < 4; ++i) {
+        x[i] = sum[i] + small[i];
+        carry[i] = small[i] - (x[i] - sum[i]);
+    }
+}
+
+/* Bring the table up to date. */
+static void engel_geodesics_tell(const engel_geodesics_solver *s, engel_geodesics_table *table)
+{
+    for (int stage = 0; stage < 1; ++stage) {
+        if (table->fits[stage] == s->memory[stage].fits) continue;
+        table->fits[stage] = s->memory[stage].fits;
+        for (int k = 0; k < 3; ++k)
+            for (int lane = 0; lane < engel_geodesics_LANES; ++lane) table->coef[stage][k][lane] = s->coef[stage][k];
+        memcpy(table->weight[stage], s->memory[stage].weight, sizeof table->weight[stage]);
+    }
+}
+
+/* The guesses for the next engel_geodesics_LANES values. */
+static void engel_geodesics_foresee(const engel_geodesics_memory *memory, engel_geodesics_lanes weight[restrict][4],
+    engel_geodesics_lanes y[restrict 4])
+{
+    const int last = memory->count - 1;
+    for (int i = 0; i < 4; ++i) {
+        engel_geodesics_EACH_LANE
+        for (int lane = 0; lane < engel_geodesics_LANES; ++lane) {
+            double even = 0.0, odd = 0.0;
+            for (int k = 0; k < 32; k += 2) {
+                even += weight[k][i][lane] * memory->past[last - k][i];
+                odd += weight[k + 1][i][lane] * memory->past[last - 1 - k][i];
+            }
+            y[i][lane] = even + odd;
+        }
+    }
+}
+
+/* Correct y by the residuals that the chain found. The largest size of a correction; infinite if one is not finite. */
+static double engel_geodesics_correct(engel_geodesics_lines *line)
+{
+    engel_geodesics_lanes size, delta[4];
+    double largest = 0.0, total = 0.0;
+    memset(delta, 0, sizeof delta);
+    for (int i = 0; i < 4; ++i)
+        for (int j = 0; j < 4; ++j) {
+            engel_geodesics_EACH_LANE
+            for (int lane = 0; lane < engel_geodesics_LANES; ++lane)
+                delta[i][lane] += line->inverse[i * 4 + j][lane] * line->residual[j][lane];
+        }
+    engel_geodesics_sizes(line->y, delta, size);
+    for (int i = 0; i < 4; ++i)
+        for (int lane = 0; lane < engel_geodesics_LANES; ++lane) line->y[i][lane] -= delta[i][lane];
+    for (int lane = 0; lane < engel_geodesics_LANES; ++lane) {
+        total += size[lane];
+        largest = size[lane] > largest ? size[lane] : largest;
+    }
+    return isfinite(total) ? largest : HUGE_VAL;
+}
+
+/* engel_geodesics_LANES steps at once: guess the points of all, and correct them together until the error that remains is as
+   small as after a single step. 0, and the solver as before, where that does not come about. */
+static int engel_geodesics_block(engel_geodesics_solver *s, engel_geodesics_table *table)
+{
+    engel_geodesics_lines line[1];
+    double x[4], carry[4], value[4], previous = HUGE_VAL;
+    int passes = 0, solved = 0;
+    for (int stage = 0; stage < 1; ++stage)
+        engel_geodesics_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
+    while (!solved) {
+        double size = 0.0;
+        for (int stage = 0; stage < 1; ++stage) engel_geodesics_tabulate(table->coef[stage], &line[stage]);
+        memcpy(x, s->x, sizeof x);
+        memcpy(carry, s->carry, sizeof carry);
+        engel_geodesics_chain(line, x, carry);
+        for (int stage = 0; stage < 1; ++stage) size = fmax(size, engel_geodesics_correct(&line[stage]));
+        s->evaluations += 1 * engel_geodesics_LANES;
+        const double growth = size / (previous * previous);
+        /* The second test: after the square of so small a correction there is rounding only. */
+        solved = size * size * (growth > 1.0 ? growth : 1.0) <= 1e-20 || (previous < 1e-8 && size < 1e-10);
+        if (++passes == 4 || !(size < previous)) break;
+        previous = size;
+    }
+    for (int i = 0; i < 4; ++i)
+        if (!isfinite(x[i])) return 0;
+    if (!solved) return 0;
+    memcpy(s->x, x, sizeof x);
+    memcpy(s->carry, carry, sizeof carry);
+    s->steps += engel_geodesics_LANES;
+    for (int stage = 0; stage < 1; ++stage) {
+        engel_geodesics_memory *memory = &s->memory[stage];
+        for (int lane = 0; lane < engel_geodesics_LANES; ++lane) {
+            for (int i = 0; i < 4; ++i) value[i] = line[stage].y[i][lane];
+            engel_geodesics_record(memory, value);
+        }
+        memory->slow = passes > 1 ? memory->slow + engel_geodesics_LANES : 0;
+        if (memory->slow > memory->patience) engel_geodesics_fit(memory);
+    }
+    return 1;
+}
+
+/* Whether a block may be tried: not before there are recurrences to guess with, and not for a while after one that
+   failed. They take a thousand steps to repay. */
+static int engel_geodesics_may_block(engel_geodesics_solver *s, double h, size_t steps)
+{
+    int fit = s->setback > 0 && s->steps - s->fitted >= 1000;
+    if (!s->ready || memcmp(&h, &s->h, sizeof h) != 0 || steps < engel_geodesics_LANES) return 0;
+    if (s->pause > 0) {
+        --s->pause;
+        return 0;
+    }
+    for (int stage = 0; stage < 1; ++stage) {
+        fit = fit || s->memory[stage].fits == 0;
+        if (s->memory[stage].count < 96) return 0;
+    }
+    if (fit && steps < 1000) return 0;
+    for (int stage = 0; stage < 1 && fit; ++stage) engel_geodesics_fit(&s->memory[stage]);
+    if (fit) s->fitted = s->steps;
+    return 1;
+}
+
+/* Blocks of steps where the motion can be foreseen, single steps elsewhere: the results differ by round-off only. */
 engel_geodesics_status engel_geodesics_integrate(engel_geodesics_solver *s, double h, size_t steps)
 {
-    for (size_t k = 0; k < steps; ++k) {
+    engel_geodesics_table table;
+    for (int stage = 0; stage < 1; ++stage) table.fits[stage] = -1;
+    while (steps > 0) {
+        if (s != NULL && engel_geodesics_may_block(s, h, steps)) {
+            engel_geodesics_tell(s, &table);
+            if (engel_geodesics_block(s, &table)) {
+                steps -= engel_geodesics_LANES;
+                s->setback /= 2;
+                continue;
+            }
+            s->setback = 2 * s->setback + engel_geodesics_LANES > 1000 ? 1000 : 2 * s->setback + engel_geodesics_LANES;
+            s->pause = s->setback;
+        }
         const engel_geodesics_status status = engel_geodesics_step(s, h);
         if (status != engel_geodesics_OK) return status;
+        --steps;
     }
     return engel_geodesics_OK;
 }

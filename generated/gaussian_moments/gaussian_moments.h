@@ -13,13 +13,12 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 5e086162076c1ec2fe344045bd80db09337498de9e012ec186c427154b54a8b8
+ * body-sha256: 52a7515ab4430fac9e343f8fde8efec3097d0797158500dbbab96f93dd51322d
  */
 #ifndef GAUSSIAN_MOMENTS_H
 #define GAUSSIAN_MOMENTS_H
 
 #include <stddef.h>
-
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -47,19 +46,17 @@ typedef enum {
     gaussian_moments_BAD_ARGUMENT    /* a null pointer, or a value that is not finite */
 } gaussian_moments_status;
 
-/* Recent values of the unknown of the inner solve, for its starting guess. Two predictors compete: extrapolation by
-   backward differences, and a linear recurrence fitted to the last 80 values; they affect speed only. */
+/* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
+   fitted to the last 96 values. They affect speed only. */
 typedef struct {
-    int rows;  /* rows of lag in use */
-    int guess; /* how many of them the extrapolation adds up */
-    int count; /* values in past */
-    int slow;  /* how many of the last steps took more than one iteration */
-    int trained; /* whether weight is set */
-    double lag[8][gaussian_moments_DIM]; /* backward differences, order by order */
-    double past[160][gaussian_moments_DIM];   /* values, the latest last */
-    double weight[16][gaussian_moments_DIM]; /* of past values, the latest first */
-    double predicted[2][gaussian_moments_DIM]; /* what the two predictors say of the next value */
-    double error[2];                     /* their recent errors */
+    int count;    /* values in past */
+    int order;    /* how many of them the extrapolation uses */
+    int fits;     /* how often weight has been fitted */
+    int fitting;  /* whether the recurrence is the better guess */
+    int slow;     /* how many of the last steps took more than one iteration */
+    int patience; /* how many of those before the recurrence is fitted again */
+    double past[192][gaussian_moments_DIM]; /* values, the latest last */
+    double weight[32][gaussian_moments_DIM][8]; /* of past values, the latest first, for the next values */
 } gaussian_moments_memory;
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with gaussian_moments_init. */
@@ -71,6 +68,9 @@ typedef struct {
     gaussian_moments_params params;
     double h;  /* the step size that coef belongs to */
     int ready; /* whether coef has been computed */
+    int pause;   /* steps to make singly before a block is tried */
+    int setback; /* the last pause, halved with every block that succeeds */
+    size_t fitted; /* steps when recurrences were last fitted for blocks */
     double coef[1][14]; /* what depends on params and h only, for each stage */
     gaussian_moments_memory memory[1];
 } gaussian_moments_solver;

@@ -14,13 +14,12 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: c1cfb45d808635bc0635635d02de53195221dafe552fab1c16eae94a444fae11
+ * body-sha256: a571aacbcece27405a0f55ca0299f6433b0de8673926f9762ca7921dfacd8cec
  */
 #ifndef GUIDING_CENTRE_H
 #define GUIDING_CENTRE_H
 
 #include <stddef.h>
-
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -49,19 +48,17 @@ typedef enum {
     guiding_centre_BAD_ARGUMENT    /* a null pointer, or a value that is not finite */
 } guiding_centre_status;
 
-/* Recent values of the unknown of the inner solve, for its starting guess. Two predictors compete: extrapolation by
-   backward differences, and a linear recurrence fitted to the last 80 values; they affect speed only. */
+/* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
+   fitted to the last 96 values. They affect speed only. */
 typedef struct {
-    int rows;  /* rows of lag in use */
-    int guess; /* how many of them the extrapolation adds up */
-    int count; /* values in past */
-    int slow;  /* how many of the last steps took more than one iteration */
-    int trained; /* whether weight is set */
-    double lag[8][guiding_centre_DIM]; /* backward differences, order by order */
-    double past[160][guiding_centre_DIM];   /* values, the latest last */
-    double weight[16][guiding_centre_DIM]; /* of past values, the latest first */
-    double predicted[2][guiding_centre_DIM]; /* what the two predictors say of the next value */
-    double error[2];                     /* their recent errors */
+    int count;    /* values in past */
+    int order;    /* how many of them the extrapolation uses */
+    int fits;     /* how often weight has been fitted */
+    int fitting;  /* whether the recurrence is the better guess */
+    int slow;     /* how many of the last steps took more than one iteration */
+    int patience; /* how many of those before the recurrence is fitted again */
+    double past[192][guiding_centre_DIM]; /* values, the latest last */
+    double weight[32][guiding_centre_DIM][1]; /* of past values, the latest first, for the next value */
 } guiding_centre_memory;
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with guiding_centre_init. */

@@ -13,12 +13,13 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: a18335333bcaf8551ab3ff519852fe823660749507d69367821132ea8cbe9f39
+ * body-sha256: 2cf81a1f796671e2bbe077e45cc2bcdcf070d155181ff3d767a5a4c26b9767f2
  */
 #include "harmonic_oscillator.h"
 
 #include <float.h>
 #include <math.h>
+#include <stdint.h>
 #include <string.h>
 
 const harmonic_oscillator_params harmonic_oscillator_default_params = { 1.0, 1.0 };
@@ -122,119 +123,128 @@ static int harmonic_oscillator_solve(double matrix[4], double side[2])
     return 1;
 }
 
-/* Keep the backward differences of a vector that varies slowly from step to step (y - x), and choose how
-   many of them to extrapolate with next time: the first difference left out estimates the error of the guess. */
-static void harmonic_oscillator_difference(harmonic_oscillator_memory *memory, const double value[2])
+/* The guess for the next value (y), from earlier ones; 0 if there are none. */
+static int harmonic_oscillator_predict(const harmonic_oscillator_memory *memory, double value[2])
 {
-    double row[2], least = HUGE_VAL;
-    const int rows = memory->rows < 8 ? memory->rows + 1 : 8;
-    memcpy(row, value, sizeof row);
-    for (int k = 0; k < rows; ++k) {
-        double size = 0.0;
-        for (int i = 0; i < 2; ++i) {
-            const double before = k < memory->rows ? memory->lag[k][i] : 0.0;
-            memory->lag[k][i] = row[i];
-            size += fabs(row[i]);
-            row[i] -= before;
+    const int last = memory->count - 1;
+    double odd[2] = { 0.0 }, binomial = -1.0;
+    memset(value, 0, 2 * sizeof value[0]);
+    if (memory->fitting) {
+        for (int k = 0; k < 32; k += 2)
+            for (int i = 0; i < 2; ++i) {
+                value[i] += memory->weight[k][i][0] * memory->past[last - k][i];
+                odd[i] += memory->weight[k + 1][i][0] * memory->past[last - 1 - k][i];
+            }
+        for (int i = 0; i < 2; ++i) value[i] += odd[i];
+    } else {
+        for (int k = 0; k < memory->order && k <= last; ++k) {
+            binomial *= -(double)(memory->order - k) / (k + 1);
+            for (int i = 0; i < 2; ++i) value[i] += binomial * memory->past[last - k][i];
         }
+    }
+    return last >= 0;
+}
+
+/* Choose the guess that would have been best for a value that took several iterations. */
+static void harmonic_oscillator_judge(harmonic_oscillator_memory *memory, const double value[2])
+{
+    double row[8 + 1][2], guess[2], least = HUGE_VAL, fitted = HUGE_VAL;
+    const int rows = memory->count < 8 ? memory->count : 8;
+    memcpy(row[0], value, sizeof row[0]);
+    for (int k = 0; k < rows; ++k) memcpy(row[k + 1], memory->past[memory->count - 1 - k], sizeof row[0]);
+    for (int order = 1; order <= rows; ++order) { /* row[0] becomes the backward difference of this order */
+        double size = 0.0;
+        for (int k = 0; k <= rows - order; ++k)
+            for (int i = 0; i < 2; ++i) row[k][i] -= row[k + 1][i];
+        for (int i = 0; i < 2; ++i) size += fabs(row[0][i]);
         if (size < least) {
             least = size;
-            memory->guess = k;
+            memory->order = order;
         }
     }
-    memory->rows = rows;
-}
-
-/* The guess of the better predictor; zero without a history. Both are kept, to be judged by the solved value. */
-static void harmonic_oscillator_predict(harmonic_oscillator_memory *memory, double value[2])
-{
-    double(*guess)[2] = memory->predicted;
-    memset(memory->predicted, 0, sizeof memory->predicted);
-    for (int k = 0; k < memory->guess; ++k)
-        for (int i = 0; i < 2; ++i) guess[0][i] += memory->lag[k][i];
-    if (memory->trained) {
-        const int last = memory->count - 1;
-        double odd[2] = { 0.0 };
-        for (int k = 0; k < 16; k += 2)
-            for (int i = 0; i < 2; ++i) {
-                guess[1][i] += memory->weight[k][i] * memory->past[last - k][i];
-                odd[i] += memory->weight[k + 1][i] * memory->past[last - 1 - k][i];
-            }
-        for (int i = 0; i < 2; ++i) guess[1][i] += odd[i];
+    memory->fitting = memory->fits > 0;
+    if (memory->fitting && harmonic_oscillator_predict(memory, guess)) {
+        fitted = 0.0;
+        for (int i = 0; i < 2; ++i) fitted += fabs(value[i] - guess[i]);
     }
-    memcpy(value, guess[memory->trained && memory->error[1] <= memory->error[0]], 2 * sizeof value[0]);
+    memory->fitting = memory->fits > 0 && fitted <= least;
+    if (memory->order == 0) memory->order = 1;
 }
 
-/* Fit the recurrence value[m] = sum of weight[k] * value[m - 1 - k] to the history, component by component: ridge
-   least squares by modified Gram-Schmidt, the ridge at the level of rounding. */
+/* Fit the recurrences value[m + l] = sum of weight[k][..][l] * value[m - 1 - k], l = 0 ... 8 - 1, to the history,
+   component by component: ridge least squares by modified Gram-Schmidt, the ridge at the level of rounding. The last
+   8 columns of q are the right-hand sides. */
 static void harmonic_oscillator_train(harmonic_oscillator_memory *memory, int component)
 {
-    enum { ROWS = 80 - 16, ALL = 80 };
-    double q[16][ALL], r[16][16], b[ALL] = { 0.0 }, largest = 0.0;
-    const int first = memory->count - 80;
+    enum { WINDOW = 32, AHEAD = 8, ROWS = 96 - WINDOW - AHEAD + 1 };
+    double q[ROWS + WINDOW][WINDOW + AHEAD], r[WINDOW][WINDOW + AHEAD], largest = 0.0;
     memset(q, 0, sizeof q);
-    for (int i = 0; i < 80; ++i)
-        if (fabs(memory->past[first + i][component]) > largest) largest = fabs(memory->past[first + i][component]);
-    for (int k = 0; k < 16; ++k) {
-        for (int i = 0; i < ROWS; ++i) q[k][i] = memory->past[first + i + 16 - 1 - k][component];
-        q[k][ROWS + k] = 1e-13 * largest;
-    }
-    for (int i = 0; i < ROWS; ++i) b[i] = memory->past[first + i + 16][component];
-    for (int k = 0; k < 16; ++k) {
-        double norm = 0.0, along = 0.0;
-        for (int i = 0; i < ALL; ++i) norm += q[k][i] * q[k][i];
-        r[k][k] = sqrt(norm);
-        for (int i = 0; i < ALL; ++i) q[k][i] = norm > 0.0 ? q[k][i] / r[k][k] : 0.0;
-        for (int j = k + 1; j < 16; ++j) {
-            double dot = 0.0;
-            for (int i = 0; i < ALL; ++i) dot += q[k][i] * q[j][i];
-            r[k][j] = dot;
-            for (int i = 0; i < ALL; ++i) q[j][i] -= dot * q[k][i];
+    memset(r, 0, sizeof r);
+    for (int i = 0; i < ROWS; ++i) {
+        for (int j = 0; j < WINDOW + AHEAD; ++j) {
+            const int place = j < WINDOW ? WINDOW - 1 - j : j;
+            q[i][j] = memory->past[memory->count - 96 + i + place][component];
         }
-        for (int i = 0; i < ALL; ++i) along += q[k][i] * b[i];
-        memory->weight[k][component] = along;
-        for (int i = 0; i < ALL; ++i) b[i] -= along * q[k][i];
+        if (fabs(q[i][0]) > largest) largest = fabs(q[i][0]);
     }
-    for (int k = 16 - 1; k >= 0; --k) {
-        double sum = memory->weight[k][component];
-        for (int j = k + 1; j < 16; ++j) sum -= r[k][j] * memory->weight[j][component];
-        memory->weight[k][component] = r[k][k] > 0.0 ? sum / r[k][k] : 0.0;
+    for (int k = 0; k < WINDOW; ++k) q[ROWS + k][k] = 1e-13 * largest;
+    for (int k = 0; k < WINDOW; ++k) {
+        for (int i = 0; i < ROWS + WINDOW; ++i)
+            for (int j = k; j < WINDOW + AHEAD; ++j) r[k][j] += q[i][k] * q[i][j];
+        const double scale = r[k][k] > 0.0 ? 1.0 / r[k][k] : 0.0;
+        for (int j = k + 1; j < WINDOW + AHEAD; ++j) r[k][j] *= scale;
+        for (int i = 0; i < ROWS + WINDOW; ++i)
+            for (int j = k + 1; j < WINDOW + AHEAD; ++j) q[i][j] -= q[i][k] * r[k][j];
     }
+    for (int l = 0; l < AHEAD; ++l)
+        for (int k = WINDOW - 1; k >= 0; --k) {
+            double sum = r[k][WINDOW + l];
+            for (int j = k + 1; j < WINDOW; ++j) sum -= r[k][j] * memory->weight[j][component][l];
+            memory->weight[k][component][l] = sum;
+        }
 }
 
-/* Take in the solved value: update both predictors and their errors, and fit the recurrence when steps have been
-   taking several iterations. */
-static void harmonic_oscillator_remember(harmonic_oscillator_memory *memory, const double value[2], int iterations)
+/* Add a value to the history. */
+static void harmonic_oscillator_record(harmonic_oscillator_memory *memory, const double value[2])
 {
-    for (int kind = 0; kind < 2; ++kind) {
-        double error = 0.0;
-        for (int i = 0; i < 2; ++i) error += fabs(value[i] - memory->predicted[kind][i]);
-        memory->error[kind] = fmax(0.8 * memory->error[kind], error);
-    }
-    harmonic_oscillator_difference(memory, value);
-    if (memory->count == 160) {
-        memmove(memory->past, memory->past + 160 - 80, 80 * sizeof memory->past[0]);
-        memory->count = 80;
+    if (memory->count == 192) {
+        memmove(memory->past, memory->past + 192 - 96, 96 * sizeof memory->past[0]);
+        memory->count = 96;
     }
     memcpy(memory->past[memory->count++], value, 2 * sizeof value[0]);
-    memory->slow = iterations > 1 ? memory->slow + 1 : 0;
-    if (memory->slow >= 80 && memory->count >= 80) {
-        for (int i = 0; i < 2; ++i) harmonic_oscillator_train(memory, i);
-        memory->trained = 1;
-        memory->error[1] = 0.0;
-        memory->slow = -80;
-    }
 }
 
-/* x + change in compensated arithmetic. 0, and x as before, if the sum is not finite. */
-static int harmonic_oscillator_advance(harmonic_oscillator_solver *s, const double change[2])
+/* Fit the recurrence to the last values; with every time, wait longer before it is done again. */
+static void harmonic_oscillator_fit(harmonic_oscillator_memory *memory)
+{
+    for (int i = 0; i < 2; ++i) harmonic_oscillator_train(memory, i);
+    memory->fitting = 1;
+    ++memory->fits;
+    memory->slow = 0;
+    memory->patience = memory->patience < 10000 ? 2 * memory->patience + 96 : 20000;
+}
+
+/* Take in the solved value: what took one iteration needs no better guess. */
+static void harmonic_oscillator_remember(harmonic_oscillator_memory *memory, const double value[2], int iterations)
+{
+    if (iterations > 1) harmonic_oscillator_judge(memory, value);
+    harmonic_oscillator_record(memory, value);
+    memory->slow = iterations > 1 ? memory->slow + 1 : 0;
+    if (memory->slow > memory->patience && memory->count >= 96) harmonic_oscillator_fit(memory);
+}
+
+/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last
+   bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the
+   sum is not finite. */
+static int harmonic_oscillator_advance(harmonic_oscillator_solver *s, const double change[2], const double correction[2])
 {
     double x[2], carry[2];
     for (int i = 0; i < 2; ++i) {
-        const double addend = change[i] + s->carry[i];
-        x[i] = s->x[i] + addend;
-        const double added = x[i] - s->x[i];
-        carry[i] = (s->x[i] - (x[i] - added)) + (addend - added);
+        const double sum = s->x[i] + change[i], added = sum - s->x[i];
+        const double lost = (s->x[i] - (sum - added)) + (change[i] - added);
+        const double small = lost + (s->carry[i] + correction[i]);
+        x[i] = sum + small;
+        carry[i] = small - (x[i] - sum);
         if (!isfinite(x[i])) return 0;
     }
     memcpy(s->x, x, sizeof x);
@@ -258,20 +268,19 @@ static double harmonic_oscillator_size(const double y[2], const double delta[2])
 
 /* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the extrapolated guess, and advance. The
    increment is corrected to first order by the last Newton correction, so that correction costs no evaluation:
-   a correction is accepted when the error that remains after it, quadratic in it, is below 1e-18. */
+   a correction is accepted when the error that remains after it, quadratic in it, is below 1e-20. */
 static harmonic_oscillator_status harmonic_oscillator_attempt(harmonic_oscillator_solver *s, int stage)
 {
     const double *coef = s->coef[stage];
     harmonic_oscillator_memory *memory = &s->memory[stage];
     double y[2], delta[2], displacement[2], increment[2];
     double jacobian[4], increment_jacobian[4];
-    harmonic_oscillator_predict(memory, y);
-    for (int i = 0; i < 2; ++i) y[i] += s->x[i];
+    if (!harmonic_oscillator_predict(memory, y)) memcpy(y, s->x, sizeof y);
     double previous = HUGE_VAL;
     for (int iteration = 0; iteration < 20; ++iteration) {
         harmonic_oscillator_linearise(coef, y, displacement, increment, jacobian, increment_jacobian);
         ++s->evaluations;
-        for (int i = 0; i < 2; ++i) delta[i] = ((y[i] - s->x[i]) - s->carry[i]) + displacement[i];
+        for (int i = 0; i < 2; ++i) delta[i] = ((y[i] - s->x[i]) + displacement[i]) - s->carry[i];
         const int regular = harmonic_oscillator_solve(jacobian, delta);
         const double size = harmonic_oscillator_size(y, delta);
         if (!isfinite(size)) return harmonic_oscillator_NOT_FINITE;
@@ -280,14 +289,12 @@ static harmonic_oscillator_status harmonic_oscillator_attempt(harmonic_oscillato
         const double growth = size / (previous * previous);
         const double remaining = size * size * (growth > 1.0 ? growth : 1.0);
         /* The second test: corrections no longer shrink, the solve has reached the level of rounding. */
-        if (remaining <= 1e-18 || (previous < 1e-8 && size > 0.25 * previous)) {
-            double offset[2];
-            for (int i = 0; i < 2; ++i) {
-                offset[i] = y[i] - s->x[i];
-                for (int j = 0; j < 2; ++j) increment[i] -= increment_jacobian[i * 2 + j] * delta[j];
-            }
-            if (!harmonic_oscillator_advance(s, increment)) return harmonic_oscillator_NOT_FINITE;
-            harmonic_oscillator_remember(memory, offset, iteration + 1);
+        if (remaining <= 1e-20 || (previous < 1e-8 && size > 0.25 * previous)) {
+            double correction[2] = { 0.0 };
+            for (int i = 0; i < 2; ++i)
+                for (int j = 0; j < 2; ++j) correction[i] -= increment_jacobian[i * 2 + j] * delta[j];
+            if (!harmonic_oscillator_advance(s, increment, correction)) return harmonic_oscillator_NOT_FINITE;
+            harmonic_oscillator_remember(memory, y, iteration + 1);
             return harmonic_oscillator_OK;
         }
         previous = size;
@@ -304,7 +311,7 @@ static harmonic_oscillator_status harmonic_oscillator_stages(harmonic_oscillator
     memcpy(carry, s->carry, sizeof carry);
     for (int stage = 0; stage < 1; ++stage) {
         harmonic_oscillator_status status = harmonic_oscillator_attempt(s, stage);
-        if (status != harmonic_oscillator_OK && s->memory[stage].rows > 0) {
+        if (status != harmonic_oscillator_OK && s->memory[stage].count > 0) {
             memset(&s->memory[stage], 0, sizeof s->memory[stage]);
             status = harmonic_oscillator_attempt(s, stage);
         }
@@ -345,11 +352,290 @@ harmonic_oscillator_status harmonic_oscillator_step(harmonic_oscillator_solver *
     return status;
 }
 
+/*
+ * Eight at a time: below, the formulas of a step are evaluated for 8 steps of a trajectory, or members of an
+ * ensemble, at once. Compilers make vector instructions of the loops over lanes.
+ */
+enum { harmonic_oscillator_LANES = 8 };
+
+#if defined(__GNUC__)
+typedef double harmonic_oscillator_lanes[harmonic_oscillator_LANES] __attribute__((aligned(64))); /* a value in each lane */
+#else
+typedef double harmonic_oscillator_lanes[harmonic_oscillator_LANES];
+#endif
+
+#if defined(__clang__)
+#define harmonic_oscillator_EACH_LANE _Pragma("clang loop vectorize(assume_safety)")
+#pragma clang diagnostic ignored "-Wpass-failed"
+#elif defined(__GNUC__)
+#define harmonic_oscillator_EACH_LANE _Pragma("GCC ivdep") _Pragma("GCC unroll 1")
+#else
+#define harmonic_oscillator_EACH_LANE
+#endif
+
+/* What all blocks share: coefficients, the same in each lane, and the recurrences by which they are foreseen. */
+typedef struct {
+    int fits[1]; /* the fit that weight is of; -1 for none */
+    harmonic_oscillator_lanes coef[1][5], weight[1][32][2];
+} harmonic_oscillator_table;
+
+/* A stage in all lanes, linear around y: a residual r of alpha(y) = x takes inverse r from y and gain r from the
+   increment. */
+typedef struct {
+    harmonic_oscillator_lanes y[2], displacement[2], increment[2], residual[2];
+    harmonic_oscillator_lanes inverse[4], slope[4], gain[4];
+} harmonic_oscillator_lines;
+
+/* harmonic_oscillator_linearise in all lanes. */
+static void harmonic_oscillator_linearise_lanes(harmonic_oscillator_lanes coef[restrict 5],
+                                                harmonic_oscillator_lanes y[restrict 2],
+                                                harmonic_oscillator_lanes displacement[restrict 2],
+                                                harmonic_oscillator_lanes increment[restrict 2],
+                                                harmonic_oscillator_lanes jacobian[restrict 4],
+                                                harmonic_oscillator_lanes increment_jacobian[restrict 4])
+{
+    harmonic_oscillator_EACH_LANE
+    for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane) {
+        const double q = y[0][lane];
+        const double p = y[1][lane];
+        const double p_p = coef[1][lane] * p;
+        const double p_q = coef[0][lane] * q;
+        displacement[0][lane] = (-0.5) * p_p;
+        displacement[1][lane] = 0.5 * p_q;
+        increment[0][lane] = p_p;
+        increment[1][lane] = -p_q;
+        jacobian[0][lane] = 1.0;
+        jacobian[1][lane] = coef[2][lane];
+        jacobian[2][lane] = coef[3][lane];
+        jacobian[3][lane] = 1.0;
+        increment_jacobian[0][lane] = 0.0;
+        increment_jacobian[1][lane] = coef[1][lane];
+        increment_jacobian[2][lane] = coef[4][lane];
+        increment_jacobian[3][lane] = 0.0;
+    }
+}
+
+/* harmonic_oscillator_invert in all lanes. */
+static void harmonic_oscillator_invert_lanes(harmonic_oscillator_lanes matrix[restrict 4],
+                                             harmonic_oscillator_lanes slope[restrict 4],
+                                             harmonic_oscillator_lanes inverse[restrict 4],
+                                             harmonic_oscillator_lanes gain[restrict 4],
+                                             harmonic_oscillator_lanes reciprocal[restrict 2])
+{
+    harmonic_oscillator_EACH_LANE
+    for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane) {
+        const double t1 = 1.0 / matrix[0][lane];
+        const double t2 = matrix[1][lane] * t1;
+        const double t3 = 1.0 / (matrix[3][lane] - matrix[2][lane] * t2);
+        const double t4 = matrix[2][lane] * t1 * t3;
+        const double t5 = t1 + t2 * t4;
+        const double t6 = t2 * t3;
+        inverse[0][lane] = t5;
+        inverse[1][lane] = -t6;
+        inverse[2][lane] = -t4;
+        inverse[3][lane] = t3;
+        gain[0][lane] = slope[0][lane] * t5 - slope[1][lane] * t4;
+        gain[1][lane] = slope[1][lane] * t3 - slope[0][lane] * t6;
+        gain[2][lane] = slope[2][lane] * t5 - slope[3][lane] * t4;
+        gain[3][lane] = slope[3][lane] * t3 - slope[2][lane] * t6;
+        reciprocal[0][lane] = t1;
+        reciprocal[1][lane] = t3;
+    }
+}
+
+/* Everything about a stage at the points y. The matrices are I + O(h): where a pivot is far from 1, all is infinite. */
+static void harmonic_oscillator_tabulate(harmonic_oscillator_lanes coef[restrict], harmonic_oscillator_lines *line)
+{
+    harmonic_oscillator_lanes jacobian[4], reciprocal[2];
+    harmonic_oscillator_linearise_lanes(coef, line->y, line->displacement, line->increment, jacobian, line->slope);
+    harmonic_oscillator_invert_lanes(jacobian, line->slope, line->inverse, line->gain, reciprocal);
+    for (int i = 0; i < 2; ++i) {
+        harmonic_oscillator_EACH_LANE
+        for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane)
+            line->inverse[i][lane] += fabs(reciprocal[i][lane]) < 1e3 ? 0.0 : HUGE_VAL;
+    }
+}
+
+/* harmonic_oscillator_size in all lanes, summed over the components. */
+static void harmonic_oscillator_sizes(harmonic_oscillator_lanes y[restrict 2], harmonic_oscillator_lanes delta[restrict 2],
+    harmonic_oscillator_lanes size)
+{
+    harmonic_oscillator_lanes norm = { 0.0 };
+    memset(size, 0, harmonic_oscillator_LANES * sizeof size[0]);
+    for (int i = 0; i < 2; ++i)
+        for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane)
+            norm[lane] = 1e-6 * fabs(y[i][lane]) > norm[lane] ? 1e-6 * fabs(y[i][lane]) : norm[lane];
+    for (int i = 0; i < 2; ++i) {
+        harmonic_oscillator_EACH_LANE
+        for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane)
+            size[lane] += fabs(delta[i][lane]) / (fabs(y[i][lane]) + norm[lane] + DBL_MIN);
+    }
+}
+
+/* The steps of a block one after the other, each along the lines of its lane. As X, the state with its carry, gains
+   increment - gain residual, the next residual follows from this one; X itself is added up apart. */
+static void harmonic_oscillator_chain(harmonic_oscillator_lines line[1], double x[2], double carry[2])
+{
+    double residual[2], sum[2], small[2];
+    for (int i = 0; i < 2; ++i) {
+        residual[i] = ((line->y[i][0] - x[i]) + line->displacement[i][0]) - carry[i];
+        sum[i] = x[i];
+        small[i] = carry[i];
+    }
+    for (int k = 0; k < 1 * harmonic_oscillator_LANES; ++k) {
+        const int lane = k / 1, after = (k + 1) / 1 % harmonic_oscillator_LANES;
+        harmonic_oscillator_lines *at = &line[k % 1], *next = &line[(k + 1) % 1];
+        double correction[2] = { 0.0 };
+        for (int i = 0; i < 2; ++i) {
+            at->residual[i][lane] = residual[i];
+            for (int j = 0; j < 2; ++j) correction[i] -= at->gain[i * 2 + j][lane] * residual[j];
+        }
+        for (int i = 0; i < 2; ++i) {
+            const double change = at->increment[i][lane], total = sum[i] + change, added = total - sum[i];
+            const double turn = (next->displacement[i][after] - at->displacement[i][lane]) - change;
+            residual[i] = ((next->y[i][after] - at->y[i][lane]) + turn) + (residual[i] - correction[i]);
+            small[i] += ((sum[i] - (total - added)) + (change - added)) + correction[i];
+            sum[i] = total;
+        }
+    }
+    for (int i = 0; i < 2; ++i) {
+        x[i] = sum[i] + small[i];
+        carry[i] = small[i] - (x[i] - sum[i]);
+    }
+}
+
+/* Bring the table up to date. */
+static void harmonic_oscillator_tell(const harmonic_oscillator_solver *s, harmonic_oscillator_table *table)
+{
+    for (int stage = 0; stage < 1; ++stage) {
+        if (table->fits[stage] == s->memory[stage].fits) continue;
+        table->fits[stage] = s->memory[stage].fits;
+        for (int k = 0; k < 5; ++k)
+            for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane) table->coef[stage][k][lane] = s->coef[stage][k];
+        memcpy(table->weight[stage], s->memory[stage].weight, sizeof table->weight[stage]);
+    }
+}
+
+/* The guesses for the next harmonic_oscillator_LANES values. */
+static void harmonic_oscillator_foresee(const harmonic_oscillator_memory *memory, harmonic_oscillator_lanes weight[restrict][2],
+    harmonic_oscillator_lanes y[restrict 2])
+{
+    const int last = memory->count - 1;
+    for (int i = 0; i < 2; ++i) {
+        harmonic_oscillator_EACH_LANE
+        for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane) {
+            double even = 0.0, odd = 0.0;
+            for (int k = 0; k < 32; k += 2) {
+                even += weight[k][i][lane] * memory->past[last - k][i];
+                odd += weight[k + 1][i][lane] * memory->past[last - 1 - k][i];
+            }
+            y[i][lane] = even + odd;
+        }
+    }
+}
+
+/* Correct y by the residuals that the chain found. The largest size of a correction; infinite if one is not finite. */
+static double harmonic_oscillator_correct(harmonic_oscillator_lines *line)
+{
+    harmonic_oscillator_lanes size, delta[2];
+    double largest = 0.0, total = 0.0;
+    memset(delta, 0, sizeof delta);
+    for (int i = 0; i < 2; ++i)
+        for (int j = 0; j < 2; ++j) {
+            harmonic_oscillator_EACH_LANE
+            for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane)
+                delta[i][lane] += line->inverse[i * 2 + j][lane] * line->residual[j][lane];
+        }
+    harmonic_oscillator_sizes(line->y, delta, size);
+    for (int i = 0; i < 2; ++i)
+        for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane) line->y[i][lane] -= delta[i][lane];
+    for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane) {
+        total += size[lane];
+        largest = size[lane] > largest ? size[lane] : largest;
+    }
+    return isfinite(total) ? largest : HUGE_VAL;
+}
+
+/* harmonic_oscillator_LANES steps at once: guess the points of all, and correct them together until the error that remains is as
+   small as after a single step. 0, and the solver as before, where that does not come about. */
+static int harmonic_oscillator_block(harmonic_oscillator_solver *s, harmonic_oscillator_table *table)
+{
+    harmonic_oscillator_lines line[1];
+    double x[2], carry[2], value[2], previous = HUGE_VAL;
+    int passes = 0, solved = 0;
+    for (int stage = 0; stage < 1; ++stage)
+        harmonic_oscillator_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
+    while (!solved) {
+        double size = 0.0;
+        for (int stage = 0; stage < 1; ++stage) harmonic_oscillator_tabulate(table->coef[stage], &line[stage]);
+        memcpy(x, s->x, sizeof x);
+        memcpy(carry, s->carry, sizeof carry);
+        harmonic_oscillator_chain(line, x, carry);
+        for (int stage = 0; stage < 1; ++stage) size = fmax(size, harmonic_oscillator_correct(&line[stage]));
+        s->evaluations += 1 * harmonic_oscillator_LANES;
+        const double growth = size / (previous * previous);
+        /* The second test: after the square of so small a correction there is rounding only. */
+        solved = size * size * (growth > 1.0 ? growth : 1.0) <= 1e-20 || (previous < 1e-8 && size < 1e-10);
+        if (++passes == 4 || !(size < previous)) break;
+        previous = size;
+    }
+    for (int i = 0; i < 2; ++i)
+        if (!isfinite(x[i])) return 0;
+    if (!solved) return 0;
+    memcpy(s->x, x, sizeof x);
+    memcpy(s->carry, carry, sizeof carry);
+    s->steps += harmonic_oscillator_LANES;
+    for (int stage = 0; stage < 1; ++stage) {
+        harmonic_oscillator_memory *memory = &s->memory[stage];
+        for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane) {
+            for (int i = 0; i < 2; ++i) value[i] = line[stage].y[i][lane];
+            harmonic_oscillator_record(memory, value);
+        }
+        memory->slow = passes > 1 ? memory->slow + harmonic_oscillator_LANES : 0;
+        if (memory->slow > memory->patience) harmonic_oscillator_fit(memory);
+    }
+    return 1;
+}
+
+/* Whether a block may be tried: not before there are recurrences to guess with, and not for a while after one that
+   failed. They take a thousand steps to repay. */
+static int harmonic_oscillator_may_block(harmonic_oscillator_solver *s, double h, size_t steps)
+{
+    int fit = s->setback > 0 && s->steps - s->fitted >= 1000;
+    if (!s->ready || memcmp(&h, &s->h, sizeof h) != 0 || steps < harmonic_oscillator_LANES) return 0;
+    if (s->pause > 0) {
+        --s->pause;
+        return 0;
+    }
+    for (int stage = 0; stage < 1; ++stage) {
+        fit = fit || s->memory[stage].fits == 0;
+        if (s->memory[stage].count < 96) return 0;
+    }
+    if (fit && steps < 1000) return 0;
+    for (int stage = 0; stage < 1 && fit; ++stage) harmonic_oscillator_fit(&s->memory[stage]);
+    if (fit) s->fitted = s->steps;
+    return 1;
+}
+
+/* Blocks of steps where the motion can be foreseen, single steps elsewhere: the results differ by round-off only. */
 harmonic_oscillator_status harmonic_oscillator_integrate(harmonic_oscillator_solver *s, double h, size_t steps)
 {
-    for (size_t k = 0; k < steps; ++k) {
+    harmonic_oscillator_table table;
+    for (int stage = 0; stage < 1; ++stage) table.fits[stage] = -1;
+    while (steps > 0) {
+        if (s != NULL && harmonic_oscillator_may_block(s, h, steps)) {
+            harmonic_oscillator_tell(s, &table);
+            if (harmonic_oscillator_block(s, &table)) {
+                steps -= harmonic_oscillator_LANES;
+                s->setback /= 2;
+                continue;
+            }
+            s->setback = 2 * s->setback + harmonic_oscillator_LANES > 1000 ? 1000 : 2 * s->setback + harmonic_oscillator_LANES;
+            s->pause = s->setback;
+        }
         const harmonic_oscillator_status status = harmonic_oscillator_step(s, h);
         if (status != harmonic_oscillator_OK) return status;
+        --steps;
     }
     return harmonic_oscillator_OK;
 }

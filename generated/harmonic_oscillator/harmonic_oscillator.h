@@ -13,13 +13,12 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: f4ff95b6b14828d87d6fe8d7ce116b98ddc40781d00d5f1a9cfb1670e10d40fe
+ * body-sha256: f57e971a79bb4ab744bc38db280cdb87a429a9c1be780bf592ecb6adc9a3183a
  */
 #ifndef HARMONIC_OSCILLATOR_H
 #define HARMONIC_OSCILLATOR_H
 
 #include <stddef.h>
-
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -47,19 +46,17 @@ typedef enum {
     harmonic_oscillator_BAD_ARGUMENT    /* a null pointer, or a value that is not finite */
 } harmonic_oscillator_status;
 
-/* Recent values of the unknown of the inner solve, for its starting guess. Two predictors compete: extrapolation by
-   backward differences, and a linear recurrence fitted to the last 80 values; they affect speed only. */
+/* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
+   fitted to the last 96 values. They affect speed only. */
 typedef struct {
-    int rows;  /* rows of lag in use */
-    int guess; /* how many of them the extrapolation adds up */
-    int count; /* values in past */
-    int slow;  /* how many of the last steps took more than one iteration */
-    int trained; /* whether weight is set */
-    double lag[8][harmonic_oscillator_DIM]; /* backward differences, order by order */
-    double past[160][harmonic_oscillator_DIM];   /* values, the latest last */
-    double weight[16][harmonic_oscillator_DIM]; /* of past values, the latest first */
-    double predicted[2][harmonic_oscillator_DIM]; /* what the two predictors say of the next value */
-    double error[2];                     /* their recent errors */
+    int count;    /* values in past */
+    int order;    /* how many of them the extrapolation uses */
+    int fits;     /* how often weight has been fitted */
+    int fitting;  /* whether the recurrence is the better guess */
+    int slow;     /* how many of the last steps took more than one iteration */
+    int patience; /* how many of those before the recurrence is fitted again */
+    double past[192][harmonic_oscillator_DIM]; /* values, the latest last */
+    double weight[32][harmonic_oscillator_DIM][8]; /* of past values, the latest first, for the next values */
 } harmonic_oscillator_memory;
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with harmonic_oscillator_init. */
@@ -71,6 +68,9 @@ typedef struct {
     harmonic_oscillator_params params;
     double h;  /* the step size that coef belongs to */
     int ready; /* whether coef has been computed */
+    int pause;   /* steps to make singly before a block is tried */
+    int setback; /* the last pause, halved with every block that succeeds */
+    size_t fitted; /* steps when recurrences were last fitted for blocks */
     double coef[1][5]; /* what depends on params and h only, for each stage */
     harmonic_oscillator_memory memory[1];
 } harmonic_oscillator_solver;

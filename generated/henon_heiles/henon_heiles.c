@@ -13,12 +13,13 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 16a6d35cc574fb5f3c29ec5e5c67bbeccd8ed00523f08b46e0ed9b6a918cf697
+ * body-sha256: 9d8a3f58d8b7118f35316a1164dbb4ac1a3fadd6a46e2b9e1cb1f0a8174dfbc9
  */
 #include "henon_heiles.h"
 
 #include <float.h>
 #include <math.h>
+#include <stdint.h>
 #include <string.h>
 
 const henon_heiles_params henon_heiles_default_params = { 0 };
@@ -226,119 +227,128 @@ static int henon_heiles_solve(double matrix[16], double side[4])
     return 1;
 }
 
-/* Keep the backward differences of a vector that varies slowly from step to step (y - x), and choose how
-   many of them to extrapolate with next time: the first difference left out estimates the error of the guess. */
-static void henon_heiles_difference(henon_heiles_memory *memory, const double value[4])
+/* The guess for the next value (y), from earlier ones; 0 if there are none. */
+static int henon_heiles_predict(const henon_heiles_memory *memory, double value[4])
 {
-    double row[4], least = HUGE_VAL;
-    const int rows = memory->rows < 8 ? memory->rows + 1 : 8;
-    memcpy(row, value, sizeof row);
-    for (int k = 0; k < rows; ++k) {
-        double size = 0.0;
-        for (int i = 0; i < 4; ++i) {
-            const double before = k < memory->rows ? memory->lag[k][i] : 0.0;
-            memory->lag[k][i] = row[i];
-            size += fabs(row[i]);
-            row[i] -= before;
+    const int last = memory->count - 1;
+    double odd[4] = { 0.0 }, binomial = -1.0;
+    memset(value, 0, 4 * sizeof value[0]);
+    if (memory->fitting) {
+        for (int k = 0; k < 32; k += 2)
+            for (int i = 0; i < 4; ++i) {
+                value[i] += memory->weight[k][i][0] * memory->past[last - k][i];
+                odd[i] += memory->weight[k + 1][i][0] * memory->past[last - 1 - k][i];
+            }
+        for (int i = 0; i < 4; ++i) value[i] += odd[i];
+    } else {
+        for (int k = 0; k < memory->order && k <= last; ++k) {
+            binomial *= -(double)(memory->order - k) / (k + 1);
+            for (int i = 0; i < 4; ++i) value[i] += binomial * memory->past[last - k][i];
         }
+    }
+    return last >= 0;
+}
+
+/* Choose the guess that would have been best for a value that took several iterations. */
+static void henon_heiles_judge(henon_heiles_memory *memory, const double value[4])
+{
+    double row[8 + 1][4], guess[4], least = HUGE_VAL, fitted = HUGE_VAL;
+    const int rows = memory->count < 8 ? memory->count : 8;
+    memcpy(row[0], value, sizeof row[0]);
+    for (int k = 0; k < rows; ++k) memcpy(row[k + 1], memory->past[memory->count - 1 - k], sizeof row[0]);
+    for (int order = 1; order <= rows; ++order) { /* row[0] becomes the backward difference of this order */
+        double size = 0.0;
+        for (int k = 0; k <= rows - order; ++k)
+            for (int i = 0; i < 4; ++i) row[k][i] -= row[k + 1][i];
+        for (int i = 0; i < 4; ++i) size += fabs(row[0][i]);
         if (size < least) {
             least = size;
-            memory->guess = k;
+            memory->order = order;
         }
     }
-    memory->rows = rows;
-}
-
-/* The guess of the better predictor; zero without a history. Both are kept, to be judged by the solved value. */
-static void henon_heiles_predict(henon_heiles_memory *memory, double value[4])
-{
-    double(*guess)[4] = memory->predicted;
-    memset(memory->predicted, 0, sizeof memory->predicted);
-    for (int k = 0; k < memory->guess; ++k)
-        for (int i = 0; i < 4; ++i) guess[0][i] += memory->lag[k][i];
-    if (memory->trained) {
-        const int last = memory->count - 1;
-        double odd[4] = { 0.0 };
-        for (int k = 0; k < 16; k += 2)
-            for (int i = 0; i < 4; ++i) {
-                guess[1][i] += memory->weight[k][i] * memory->past[last - k][i];
-                odd[i] += memory->weight[k + 1][i] * memory->past[last - 1 - k][i];
-            }
-        for (int i = 0; i < 4; ++i) guess[1][i] += odd[i];
+    memory->fitting = memory->fits > 0;
+    if (memory->fitting && henon_heiles_predict(memory, guess)) {
+        fitted = 0.0;
+        for (int i = 0; i < 4; ++i) fitted += fabs(value[i] - guess[i]);
     }
-    memcpy(value, guess[memory->trained && memory->error[1] <= memory->error[0]], 4 * sizeof value[0]);
+    memory->fitting = memory->fits > 0 && fitted <= least;
+    if (memory->order == 0) memory->order = 1;
 }
 
-/* Fit the recurrence value[m] = sum of weight[k] * value[m - 1 - k] to the history, component by component: ridge
-   least squares by modified Gram-Schmidt, the ridge at the level of rounding. */
+/* Fit the recurrences value[m + l] = sum of weight[k][..][l] * value[m - 1 - k], l = 0 ... 8 - 1, to the history,
+   component by component: ridge least squares by modified Gram-Schmidt, the ridge at the level of rounding. The last
+   8 columns of q are the right-hand sides. */
 static void henon_heiles_train(henon_heiles_memory *memory, int component)
 {
-    enum { ROWS = 80 - 16, ALL = 80 };
-    double q[16][ALL], r[16][16], b[ALL] = { 0.0 }, largest = 0.0;
-    const int first = memory->count - 80;
+    enum { WINDOW = 32, AHEAD = 8, ROWS = 96 - WINDOW - AHEAD + 1 };
+    double q[ROWS + WINDOW][WINDOW + AHEAD], r[WINDOW][WINDOW + AHEAD], largest = 0.0;
     memset(q, 0, sizeof q);
-    for (int i = 0; i < 80; ++i)
-        if (fabs(memory->past[first + i][component]) > largest) largest = fabs(memory->past[first + i][component]);
-    for (int k = 0; k < 16; ++k) {
-        for (int i = 0; i < ROWS; ++i) q[k][i] = memory->past[first + i + 16 - 1 - k][component];
-        q[k][ROWS + k] = 1e-13 * largest;
-    }
-    for (int i = 0; i < ROWS; ++i) b[i] = memory->past[first + i + 16][component];
-    for (int k = 0; k < 16; ++k) {
-        double norm = 0.0, along = 0.0;
-        for (int i = 0; i < ALL; ++i) norm += q[k][i] * q[k][i];
-        r[k][k] = sqrt(norm);
-        for (int i = 0; i < ALL; ++i) q[k][i] = norm > 0.0 ? q[k][i] / r[k][k] : 0.0;
-        for (int j = k + 1; j < 16; ++j) {
-            double dot = 0.0;
-            for (int i = 0; i < ALL; ++i) dot += q[k][i] * q[j][i];
-            r[k][j] = dot;
-            for (int i = 0; i < ALL; ++i) q[j][i] -= dot * q[k][i];
+    memset(r, 0, sizeof r);
+    for (int i = 0; i < ROWS; ++i) {
+        for (int j = 0; j < WINDOW + AHEAD; ++j) {
+            const int place = j < WINDOW ? WINDOW - 1 - j : j;
+            q[i][j] = memory->past[memory->count - 96 + i + place][component];
         }
-        for (int i = 0; i < ALL; ++i) along += q[k][i] * b[i];
-        memory->weight[k][component] = along;
-        for (int i = 0; i < ALL; ++i) b[i] -= along * q[k][i];
+        if (fabs(q[i][0]) > largest) largest = fabs(q[i][0]);
     }
-    for (int k = 16 - 1; k >= 0; --k) {
-        double sum = memory->weight[k][component];
-        for (int j = k + 1; j < 16; ++j) sum -= r[k][j] * memory->weight[j][component];
-        memory->weight[k][component] = r[k][k] > 0.0 ? sum / r[k][k] : 0.0;
+    for (int k = 0; k < WINDOW; ++k) q[ROWS + k][k] = 1e-13 * largest;
+    for (int k = 0; k < WINDOW; ++k) {
+        for (int i = 0; i < ROWS + WINDOW; ++i)
+            for (int j = k; j < WINDOW + AHEAD; ++j) r[k][j] += q[i][k] * q[i][j];
+        const double scale = r[k][k] > 0.0 ? 1.0 / r[k][k] : 0.0;
+        for (int j = k + 1; j < WINDOW + AHEAD; ++j) r[k][j] *= scale;
+        for (int i = 0; i < ROWS + WINDOW; ++i)
+            for (int j = k + 1; j < WINDOW + AHEAD; ++j) q[i][j] -= q[i][k] * r[k][j];
     }
+    for (int l = 0; l < AHEAD; ++l)
+        for (int k = WINDOW - 1; k >= 0; --k) {
+            double sum = r[k][WINDOW + l];
+            for (int j = k + 1; j < WINDOW; ++j) sum -= r[k][j] * memory->weight[j][component][l];
+            memory->weight[k][component][l] = sum;
+        }
 }
 
-/* Take in the solved value: update both predictors and their errors, and fit the recurrence when steps have been
-   taking several iterations. */
-static void henon_heiles_remember(henon_heiles_memory *memory, const double value[4], int iterations)
+/* Add a value to the history. */
+static void henon_heiles_record(henon_heiles_memory *memory, const double value[4])
 {
-    for (int kind = 0; kind < 2; ++kind) {
-        double error = 0.0;
-        for (int i = 0; i < 4; ++i) error += fabs(value[i] - memory->predicted[kind][i]);
-        memory->error[kind] = fmax(0.8 * memory->error[kind], error);
-    }
-    henon_heiles_difference(memory, value);
-    if (memory->count == 160) {
-        memmove(memory->past, memory->past + 160 - 80, 80 * sizeof memory->past[0]);
-        memory->count = 80;
+    if (memory->count == 192) {
+        memmove(memory->past, memory->past + 192 - 96, 96 * sizeof memory->past[0]);
+        memory->count = 96;
     }
     memcpy(memory->past[memory->count++], value, 4 * sizeof value[0]);
-    memory->slow = iterations > 1 ? memory->slow + 1 : 0;
-    if (memory->slow >= 80 && memory->count >= 80) {
-        for (int i = 0; i < 4; ++i) henon_heiles_train(memory, i);
-        memory->trained = 1;
-        memory->error[1] = 0.0;
-        memory->slow = -80;
-    }
 }
 
-/* x + change in compensated arithmetic. 0, and x as before, if the sum is not finite. */
-static int henon_heiles_advance(henon_heiles_solver *s, const double change[4])
+/* Fit the recurrence to the last values; with every time, wait longer before it is done again. */
+static void henon_heiles_fit(henon_heiles_memory *memory)
+{
+    for (int i = 0; i < 4; ++i) henon_heiles_train(memory, i);
+    memory->fitting = 1;
+    ++memory->fits;
+    memory->slow = 0;
+    memory->patience = memory->patience < 10000 ? 2 * memory->patience + 96 : 20000;
+}
+
+/* Take in the solved value: what took one iteration needs no better guess. */
+static void henon_heiles_remember(henon_heiles_memory *memory, const double value[4], int iterations)
+{
+    if (iterations > 1) henon_heiles_judge(memory, value);
+    henon_heiles_record(memory, value);
+    memory->slow = iterations > 1 ? memory->slow + 1 : 0;
+    if (memory->slow > memory->patience && memory->count >= 96) henon_heiles_fit(memory);
+}
+
+/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last
+   bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the
+   sum is not finite. */
+static int henon_heiles_advance(henon_heiles_solver *s, const double change[4], const double correction[4])
 {
     double x[4], carry[4];
     for (int i = 0; i < 4; ++i) {
-        const double addend = change[i] + s->carry[i];
-        x[i] = s->x[i] + addend;
-        const double added = x[i] - s->x[i];
-        carry[i] = (s->x[i] - (x[i] - added)) + (addend - added);
+        const double sum = s->x[i] + change[i], added = sum - s->x[i];
+        const double lost = (s->x[i] - (sum - added)) + (change[i] - added);
+        const double small = lost + (s->carry[i] + correction[i]);
+        x[i] = sum + small;
+        carry[i] = small - (x[i] - sum);
         if (!isfinite(x[i])) return 0;
     }
     memcpy(s->x, x, sizeof x);
@@ -362,20 +372,19 @@ static double henon_heiles_size(const double y[4], const double delta[4])
 
 /* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the extrapolated guess, and advance. The
    increment is corrected to first order by the last Newton correction, so that correction costs no evaluation:
-   a correction is accepted when the error that remains after it, quadratic in it, is below 1e-18. */
+   a correction is accepted when the error that remains after it, quadratic in it, is below 1e-20. */
 static henon_heiles_status henon_heiles_attempt(henon_heiles_solver *s, int stage)
 {
     const double *coef = s->coef[stage];
     henon_heiles_memory *memory = &s->memory[stage];
     double y[4], delta[4], displacement[4], increment[4];
     double jacobian[16], increment_jacobian[16];
-    henon_heiles_predict(memory, y);
-    for (int i = 0; i < 4; ++i) y[i] += s->x[i];
+    if (!henon_heiles_predict(memory, y)) memcpy(y, s->x, sizeof y);
     double previous = HUGE_VAL;
     for (int iteration = 0; iteration < 20; ++iteration) {
         henon_heiles_linearise(coef, y, displacement, increment, jacobian, increment_jacobian);
         ++s->evaluations;
-        for (int i = 0; i < 4; ++i) delta[i] = ((y[i] - s->x[i]) - s->carry[i]) + displacement[i];
+        for (int i = 0; i < 4; ++i) delta[i] = ((y[i] - s->x[i]) + displacement[i]) - s->carry[i];
         const int regular = henon_heiles_solve(jacobian, delta);
         const double size = henon_heiles_size(y, delta);
         if (!isfinite(size)) return henon_heiles_NOT_FINITE;
@@ -384,14 +393,12 @@ static henon_heiles_status henon_heiles_attempt(henon_heiles_solver *s, int stag
         const double growth = size / (previous * previous);
         const double remaining = size * size * (growth > 1.0 ? growth : 1.0);
         /* The second test: corrections no longer shrink, the solve has reached the level of rounding. */
-        if (remaining <= 1e-18 || (previous < 1e-8 && size > 0.25 * previous)) {
-            double offset[4];
-            for (int i = 0; i < 4; ++i) {
-                offset[i] = y[i] - s->x[i];
-                for (int j = 0; j < 4; ++j) increment[i] -= increment_jacobian[i * 4 + j] * delta[j];
-            }
-            if (!henon_heiles_advance(s, increment)) return henon_heiles_NOT_FINITE;
-            henon_heiles_remember(memory, offset, iteration + 1);
+        if (remaining <= 1e-20 || (previous < 1e-8 && size > 0.25 * previous)) {
+            double correction[4] = { 0.0 };
+            for (int i = 0; i < 4; ++i)
+                for (int j = 0; j < 4; ++j) correction[i] -= increment_jacobian[i * 4 + j] * delta[j];
+            if (!henon_heiles_advance(s, increment, correction)) return henon_heiles_NOT_FINITE;
+            henon_heiles_remember(memory, y, iteration + 1);
             return henon_heiles_OK;
         }
         previous = size;
@@ -408,7 +415,7 @@ static henon_heiles_status henon_heiles_stages(henon_heiles_solver *s)
     memcpy(carry, s->carry, sizeof carry);
     for (int stage = 0; stage < 1; ++stage) {
         henon_heiles_status status = henon_heiles_attempt(s, stage);
-        if (status != henon_heiles_OK && s->memory[stage].rows > 0) {
+        if (status != henon_heiles_OK && s->memory[stage].count > 0) {
             memset(&s->memory[stage], 0, sizeof s->memory[stage]);
             status = henon_heiles_attempt(s, stage);
         }
@@ -448,11 +455,404 @@ henon_heiles_status henon_heiles_step(henon_heiles_solver *s, double h)
     return status;
 }
 
+/*
+ * Eight at a time: below, the formulas of a step are evaluated for 8 steps of a trajectory, or members of an
+ * ensemble, at once. Compilers make vector instructions of the loops over lanes.
+ */
+enum { henon_heiles_LANES = 8 };
+
+#if defined(__GNUC__)
+typedef double henon_heiles_lanes[henon_heiles_LANES] __attribute__((aligned(64))); /* a value in each lane */
+#else
+typedef double henon_heiles_lanes[henon_heiles_LANES];
+#endif
+
+#if defined(__clang__)
+#define henon_heiles_EACH_LANE _Pragma("clang loop vectorize(assume_safety)")
+#pragma clang diagnostic ignored "-Wpass-failed"
+#elif defined(__GNUC__)
+#define henon_heiles_EACH_LANE _Pragma("GCC ivdep") _Pragma("GCC unroll 1")
+#else
+#define henon_heiles_EACH_LANE
+#endif
+
+/* What all blocks share: coefficients, the same in each lane, and the recurrences by which they are foreseen. */
+typedef struct {
+    int fits[1]; /* the fit that weight is of; -1 for none */
+    henon_heiles_lanes coef[1][24], weight[1][32][4];
+} henon_heiles_table;
+
+/* A stage in all lanes, linear around y: a residual r of alpha(y) = x takes inverse r from y and gain r from the
+   increment. */
+typedef struct {
+    henon_heiles_lanes y[4], displacement[4], increment[4], residual[4];
+    henon_heiles_lanes inverse[16], slope[16], gain[16];
+} henon_heiles_lines;
+
+/* henon_heiles_linearise in all lanes. */
+static void henon_heiles_linearise_lanes(henon_heiles_lanes coef[restrict 24],
+                                         henon_heiles_lanes y[restrict 4],
+                                         henon_heiles_lanes displacement[restrict 4],
+                                         henon_heiles_lanes increment[restrict 4],
+                                         henon_heiles_lanes jacobian[restrict 16],
+                                         henon_heiles_lanes increment_jacobian[restrict 16])
+{
+    henon_heiles_EACH_LANE
+    for (int lane = 0; lane < henon_heiles_LANES; ++lane) {
+        const double x = y[0][lane];
+        const double y_ = y[1][lane];
+        const double px = y[2][lane];
+        const double py = y[3][lane];
+        const double t1 = py * x;
+        const double t2 = coef[0][lane] + coef[1][lane] * y_;
+        const double t3 = x * x;
+        const double t4 = coef[2][lane] + coef[4][lane] * t3 + y_ * (coef[16][lane] + coef[3][lane] * y_);
+        const double p_px = t1 * t2 + px * t4;
+        const double t5 = px * x;
+        const double t6 = coef[3][lane] * t3;
+        const double t7 = coef[2][lane] + t6 + y_ * (coef[17][lane] + coef[4][lane] * y_);
+        const double p_py = t5 * t2 + py * t7;
+        const double t8 = px * py;
+        const double t9 = py * py;
+        const double t10 = px * px;
+        const double t11 = coef[3][lane] * t9 + coef[4][lane] * t10;
+        const double t12 = coef[9][lane] * t3;
+        const double t13 = coef[5][lane] + t12;
+        const double t14 = y_ * (coef[6][lane] + coef[7][lane] * y_);
+        const double p_x = t8 * t2 + x * (t11 + (coef[2][lane] + coef[8][lane] * t3) + y_ * (t13 + t14));
+        const double t15 = coef[1][lane] * t8;
+        const double t16 = coef[4][lane] * t9 + coef[3][lane] * t10 + (coef[2][lane] + coef[6][lane] * t3);
+        const double p_y = coef[10][lane] * t9 + coef[11][lane] * t10 + x * (t15 + x * (coef[14][lane] + t6)) + y_ * (t16 + y_ * (coef[12][lane] + coef[15][lane] * t3 + y_ * (coef[8][lane] + coef[13][lane] * y_)));
+        const double t17 = coef[21][lane] * t5 + py * t2;
+        const double t18 = 0.5 * t17;
+        const double t19 = coef[1][lane] * t1 + px * (coef[16][lane] + coef[15][lane] * y_);
+        const double t20 = x * t2;
+        const double t21 = (-0.5) * t20;
+        const double t22 = coef[15][lane] * t1 + px * t2;
+        const double t23 = coef[1][lane] * t5 + py * (coef[17][lane] + coef[21][lane] * y_);
+        const double t24 = 0.5 * t23;
+        const double t25 = t11 + (coef[2][lane] + coef[18][lane] * t3) + y_ * (coef[5][lane] + coef[19][lane] * t3 + t14);
+        const double t26 = t15 + x * (y_ * (coef[20][lane] + coef[9][lane] * y_) + t13);
+        const double t27 = 0.5 * t26;
+        const double t28 = t16 + y_ * (y_ * (coef[18][lane] + coef[23][lane] * y_) + (coef[22][lane] + t12));
+        displacement[0][lane] = (-0.5) * p_px;
+        displacement[1][lane] = (-0.5) * p_py;
+        displacement[2][lane] = 0.5 * p_x;
+        displacement[3][lane] = 0.5 * p_y;
+        increment[0][lane] = p_px;
+        increment[1][lane] = p_py;
+        increment[2][lane] = -p_x;
+        increment[3][lane] = -p_y;
+        jacobian[0][lane] = 1.0 - t18;
+        jacobian[1][lane] = (-0.5) * t19;
+        jacobian[2][lane] = (-0.5) * t4;
+        jacobian[3][lane] = t21;
+        jacobian[4][lane] = (-0.5) * t22;
+        jacobian[5][lane] = 1.0 - t24;
+        jacobian[6][lane] = t21;
+        jacobian[7][lane] = (-0.5) * t7;
+        jacobian[8][lane] = 0.5 * t25;
+        jacobian[9][lane] = t27;
+        jacobian[10][lane] = 1.0 + t18;
+        jacobian[11][lane] = 0.5 * t22;
+        jacobian[12][lane] = t27;
+        jacobian[13][lane] = 0.5 * t28;
+        jacobian[14][lane] = 0.5 * t19;
+        jacobian[15][lane] = 1.0 + t24;
+        increment_jacobian[0][lane] = t17;
+        increment_jacobian[1][lane] = t19;
+        increment_jacobian[2][lane] = t4;
+        increment_jacobian[3][lane] = t20;
+        increment_jacobian[4][lane] = t22;
+        increment_jacobian[5][lane] = t23;
+        increment_jacobian[6][lane] = t20;
+        increment_jacobian[7][lane] = t7;
+        increment_jacobian[8][lane] = -t25;
+        increment_jacobian[9][lane] = -t26;
+        increment_jacobian[10][lane] = -t17;
+        increment_jacobian[11][lane] = -t22;
+        increment_jacobian[12][lane] = -t26;
+        increment_jacobian[13][lane] = -t28;
+        increment_jacobian[14][lane] = -t19;
+        increment_jacobian[15][lane] = -t23;
+    }
+}
+
+/* henon_heiles_invert in all lanes. */
+static void henon_heiles_invert_lanes(henon_heiles_lanes matrix[restrict 16],
+                                      henon_heiles_lanes slope[restrict 16],
+                                      henon_heiles_lanes inverse[restrict 16],
+                                      henon_heiles_lanes gain[restrict 16],
+                                      henon_heiles_lanes reciprocal[restrict 4])
+{
+    henon_heiles_EACH_LANE
+    for (int lane = 0; lane < henon_heiles_LANES; ++lane) {
+        const double t1 = 1.0 / matrix[0][lane];
+        const double t2 = matrix[1][lane] * t1;
+        const double t3 = 1.0 / (matrix[5][lane] - matrix[4][lane] * t2);
+        const double t4 = matrix[4][lane] * t1 * t3;
+        const double t5 = matrix[2][lane] * t1;
+        const double t6 = (matrix[6][lane] - matrix[4][lane] * t5) * t3;
+        const double t7 = t5 - t2 * t6;
+        const double t8 = matrix[9][lane] - matrix[8][lane] * t2;
+        const double t9 = 1.0 / (matrix[10][lane] - matrix[8][lane] * t5 - t8 * t6);
+        const double t10 = (t8 * t4 - matrix[8][lane] * t1) * t9;
+        const double t11 = matrix[3][lane] * t1;
+        const double t12 = (matrix[7][lane] - matrix[4][lane] * t11) * t3;
+        const double t13 = (matrix[11][lane] - matrix[8][lane] * t11 - t8 * t12) * t9;
+        const double t14 = t11 - t2 * t12 - t7 * t13;
+        const double t15 = matrix[13][lane] - matrix[12][lane] * t2;
+        const double t16 = matrix[14][lane] - matrix[12][lane] * t5 - t15 * t6;
+        const double t17 = 1.0 / (matrix[15][lane] - matrix[12][lane] * t11 - t15 * t12 - t16 * t13);
+        const double t18 = (t15 * t4 - matrix[12][lane] * t1 - t16 * t10) * t17;
+        const double t19 = t1 + t2 * t4 - t7 * t10 - t14 * t18;
+        const double t20 = t8 * t3 * t9;
+        const double t21 = (t16 * t20 - t15 * t3) * t17;
+        const double t22 = t7 * t20 - t2 * t3 - t14 * t21;
+        const double t23 = t16 * t9 * t17;
+        const double t24 = t14 * t23 - t7 * t9;
+        const double t25 = t14 * t17;
+        const double t26 = t12 - t6 * t13;
+        const double t27 = t4 + t6 * t10 + t26 * t18;
+        const double t28 = t3 + t6 * t20 - t26 * t21;
+        const double t29 = t26 * t23 - t6 * t9;
+        const double t30 = t26 * t17;
+        const double t31 = t10 - t13 * t18;
+        const double t32 = t20 + t13 * t21;
+        const double t33 = t9 + t13 * t23;
+        const double t34 = t13 * t17;
+        inverse[0][lane] = t19;
+        inverse[1][lane] = t22;
+        inverse[2][lane] = t24;
+        inverse[3][lane] = -t25;
+        inverse[4][lane] = -t27;
+        inverse[5][lane] = t28;
+        inverse[6][lane] = t29;
+        inverse[7][lane] = -t30;
+        inverse[8][lane] = t31;
+        inverse[9][lane] = -t32;
+        inverse[10][lane] = t33;
+        inverse[11][lane] = -t34;
+        inverse[12][lane] = t18;
+        inverse[13][lane] = t21;
+        inverse[14][lane] = -t23;
+        inverse[15][lane] = t17;
+        gain[0][lane] = slope[0][lane] * t19 - slope[1][lane] * t27 + (slope[3][lane] * t18 + slope[2][lane] * t31);
+        gain[1][lane] = slope[0][lane] * t22 + slope[1][lane] * t28 + (slope[3][lane] * t21 - slope[2][lane] * t32);
+        gain[2][lane] = slope[2][lane] * t33 - slope[3][lane] * t23 + (slope[0][lane] * t24 + slope[1][lane] * t29);
+        gain[3][lane] = slope[3][lane] * t17 - slope[2][lane] * t34 - (slope[1][lane] * t30 + slope[0][lane] * t25);
+        gain[4][lane] = slope[4][lane] * t19 - slope[5][lane] * t27 + (slope[7][lane] * t18 + slope[6][lane] * t31);
+        gain[5][lane] = slope[7][lane] * t21 - slope[6][lane] * t32 + (slope[5][lane] * t28 + slope[4][lane] * t22);
+        gain[6][lane] = slope[6][lane] * t33 - slope[7][lane] * t23 + (slope[5][lane] * t29 + slope[4][lane] * t24);
+        gain[7][lane] = slope[7][lane] * t17 - slope[6][lane] * t34 - (slope[4][lane] * t25 + slope[5][lane] * t30);
+        gain[8][lane] = slope[11][lane] * t18 + slope[10][lane] * t31 + (slope[8][lane] * t19 - slope[9][lane] * t27);
+        gain[9][lane] = slope[9][lane] * t28 + slope[8][lane] * t22 + (slope[11][lane] * t21 - slope[10][lane] * t32);
+        gain[10][lane] = slope[10][lane] * t33 - slope[11][lane] * t23 + (slope[9][lane] * t29 + slope[8][lane] * t24);
+        gain[11][lane] = slope[11][lane] * t17 - slope[10][lane] * t34 - (slope[9][lane] * t30 + slope[8][lane] * t25);
+        gain[12][lane] = slope[15][lane] * t18 + slope[14][lane] * t31 + (slope[12][lane] * t19 - slope[13][lane] * t27);
+        gain[13][lane] = slope[13][lane] * t28 + slope[12][lane] * t22 + (slope[15][lane] * t21 - slope[14][lane] * t32);
+        gain[14][lane] = slope[14][lane] * t33 - slope[15][lane] * t23 + (slope[13][lane] * t29 + slope[12][lane] * t24);
+        gain[15][lane] = slope[15][lane] * t17 - slope[14][lane] * t34 - (slope[12][lane] * t25 + slope[13][lane] * t30);
+        reciprocal[0][lane] = t1;
+        reciprocal[1][lane] = t3;
+        reciprocal[2][lane] = t9;
+        reciprocal[3][lane] = t17;
+    }
+}
+
+/* Everything about a stage at the points y. The matrices are I + O(h): where a pivot is far from 1, all is infinite. */
+static void henon_heiles_tabulate(henon_heiles_lanes coef[restrict], henon_heiles_lines *line)
+{
+    henon_heiles_lanes jacobian[16], reciprocal[4];
+    henon_heiles_linearise_lanes(coef, line->y, line->displacement, line->increment, jacobian, line->slope);
+    henon_heiles_invert_lanes(jacobian, line->slope, line->inverse, line->gain, reciprocal);
+    for (int i = 0; i < 4; ++i) {
+        henon_heiles_EACH_LANE
+        for (int lane = 0; lane < henon_heiles_LANES; ++lane)
+            line->inverse[i][lane] += fabs(reciprocal[i][lane]) < 1e3 ? 0.0 : HUGE_VAL;
+    }
+}
+
+/* henon_heiles_size in all lanes, summed over the components. */
+static void henon_heiles_sizes(henon_heiles_lanes y[restrict 4], henon_heiles_lanes delta[restrict 4],
+    henon_heiles_lanes size)
+{
+    henon_heiles_lanes norm = { 0.0 };
+    memset(size, 0, henon_heiles_LANES * sizeof size[0]);
+    for (int i = 0; i < 4; ++i)
+        for (int lane = 0; lane < henon_heiles_LANES; ++lane)
+            norm[lane] = 1e-6 * fabs(y[i][lane]) > norm[lane] ? 1e-6 * fabs(y[i][lane]) : norm[lane];
+    for (int i = 0; i < 4; ++i) {
+        henon_heiles_EACH_LANE
+        for (int lane = 0; lane < henon_heiles_LANES; ++lane)
+            size[lane] += fabs(delta[i][lane]) / (fabs(y[i][lane]) + norm[lane] + DBL_MIN);
+    }
+}
+
+/* The steps of a block one after the other, each along the lines of its lane. As X, the state with its carry, gains
+   increment - gain residual, the next residual follows from this one; X itself is added up apart. */
+static void henon_heiles_chain(henon_heiles_lines line[1], double x[4], double carry[4])
+{
+    double residual[4], sum[4], small[4];
+    for (int i = 0; i < 4; ++i) {
+        residual[i] = ((line->y[i][0] - x[i]) + line->displacement[i][0]) - carry[i];
+        sum[i] = x[i];
+        small[i] = carry[i];
+    }
+    for (int k = 0; k < 1 * henon_heiles_LANES; ++k) {
+        const int lane = k / 1, after = (k + 1) / 1 % henon_heiles_LANES;
+        henon_heiles_lines *at = &line[k % 1], *next = &line[(k + 1) % 1];
+        double correction[4] = { 0.0 };
+        for (int i = 0; i < 4; ++i) {
+            at->residual[i][lane] = residual[i];
+            for (int j = 0; j < 4; ++j) correction[i] -= at->gain[i * 4 + j][lane] * residual[j];
+        }
+        for (int i = 0; i < 4; ++i) {
+            const double change = at->increment[i][lane], total = sum[i] + change, added = total - sum[i];
+            const double turn = (next->displacement[i][after] - at->displacement[i][lane]) - change;
+            residual[i] = ((next->y[i][after] - at->y[i][lane]) + turn) + (residual[i] - correction[i]);
+            small[i] += ((sum[i] - (total - added)) + (change - added)) + correction[i];
+            sum[i] = total;
+        }
+    }
+    for (int i = 0; i < 4; ++i) {
+        x[i] = sum[i] + small[i];
+        carry[i] = small[i] - (x[i] - sum[i]);
+    }
+}
+
+/* Bring the table up to date. */
+static void henon_heiles_tell(const henon_heiles_solver *s, henon_heiles_table *table)
+{
+    for (int stage = 0; stage < 1; ++stage) {
+        if (table->fits[stage] == s->memory[stage].fits) continue;
+        table->fits[stage] = s->memory[stage].fits;
+        for (int k = 0; k < 24; ++k)
+            for (int lane = 0; lane < henon_heiles_LANES; ++lane) table->coef[stage][k][lane] = s->coef[stage][k];
+        memcpy(table->weight[stage], s->memory[stage].weight, sizeof table->weight[stage]);
+    }
+}
+
+/* The guesses for the next henon_heiles_LANES values. */
+static void henon_heiles_foresee(const henon_heiles_memory *memory, henon_heiles_lanes weight[restrict][4],
+    henon_heiles_lanes y[restrict 4])
+{
+    const int last = memory->count - 1;
+    for (int i = 0; i < 4; ++i) {
+        henon_heiles_EACH_LANE
+        for (int lane = 0; lane < henon_heiles_LANES; ++lane) {
+            double even = 0.0, odd = 0.0;
+            for (int k = 0; k < 32; k += 2) {
+                even += weight[k][i][lane] * memory->past[last - k][i];
+                odd += weight[k + 1][i][lane] * memory->past[last - 1 - k][i];
+            }
+            y[i][lane] = even + odd;
+        }
+    }
+}
+
+/* Correct y by the residuals that the chain found. The largest size of a correction; infinite if one is not finite. */
+static double henon_heiles_correct(henon_heiles_lines *line)
+{
+    henon_heiles_lanes size, delta[4];
+    double largest = 0.0, total = 0.0;
+    memset(delta, 0, sizeof delta);
+    for (int i = 0; i < 4; ++i)
+        for (int j = 0; j < 4; ++j) {
+            henon_heiles_EACH_LANE
+            for (int lane = 0; lane < henon_heiles_LANES; ++lane)
+                delta[i][lane] += line->inverse[i * 4 + j][lane] * line->residual[j][lane];
+        }
+    henon_heiles_sizes(line->y, delta, size);
+    for (int i = 0; i < 4; ++i)
+        for (int lane = 0; lane < henon_heiles_LANES; ++lane) line->y[i][lane] -= delta[i][lane];
+    for (int lane = 0; lane < henon_heiles_LANES; ++lane) {
+        total += size[lane];
+        largest = size[lane] > largest ? size[lane] : largest;
+    }
+    return isfinite(total) ? largest : HUGE_VAL;
+}
+
+/* henon_heiles_LANES steps at once: guess the points of all, and correct them together until the error that remains is as
+   small as after a single step. 0, and the solver as before, where that does not come about. */
+static int henon_heiles_block(henon_heiles_solver *s, henon_heiles_table *table)
+{
+    henon_heiles_lines line[1];
+    double x[4], carry[4], value[4], previous = HUGE_VAL;
+    int passes = 0, solved = 0;
+    for (int stage = 0; stage < 1; ++stage)
+        henon_heiles_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
+    while (!solved) {
+        double size = 0.0;
+        for (int stage = 0; stage < 1; ++stage) henon_heiles_tabulate(table->coef[stage], &line[stage]);
+        memcpy(x, s->x, sizeof x);
+        memcpy(carry, s->carry, sizeof carry);
+        henon_heiles_chain(line, x, carry);
+        for (int stage = 0; stage < 1; ++stage) size = fmax(size, henon_heiles_correct(&line[stage]));
+        s->evaluations += 1 * henon_heiles_LANES;
+        const double growth = size / (previous * previous);
+        /* The second test: after the square of so small a correction there is rounding only. */
+        solved = size * size * (growth > 1.0 ? growth : 1.0) <= 1e-20 || (previous < 1e-8 && size < 1e-10);
+        if (++passes == 4 || !(size < previous)) break;
+        previous = size;
+    }
+    for (int i = 0; i < 4; ++i)
+        if (!isfinite(x[i])) return 0;
+    if (!solved) return 0;
+    memcpy(s->x, x, sizeof x);
+    memcpy(s->carry, carry, sizeof carry);
+    s->steps += henon_heiles_LANES;
+    for (int stage = 0; stage < 1; ++stage) {
+        henon_heiles_memory *memory = &s->memory[stage];
+        for (int lane = 0; lane < henon_heiles_LANES; ++lane) {
+            for (int i = 0; i < 4; ++i) value[i] = line[stage].y[i][lane];
+            henon_heiles_record(memory, value);
+        }
+        memory->slow = passes > 1 ? memory->slow + henon_heiles_LANES : 0;
+        if (memory->slow > memory->patience) henon_heiles_fit(memory);
+    }
+    return 1;
+}
+
+/* Whether a block may be tried: not before there are recurrences to guess with, and not for a while after one that
+   failed. They take a thousand steps to repay. */
+static int henon_heiles_may_block(henon_heiles_solver *s, double h, size_t steps)
+{
+    int fit = s->setback > 0 && s->steps - s->fitted >= 1000;
+    if (!s->ready || memcmp(&h, &s->h, sizeof h) != 0 || steps < henon_heiles_LANES) return 0;
+    if (s->pause > 0) {
+        --s->pause;
+        return 0;
+    }
+    for (int stage = 0; stage < 1; ++stage) {
+        fit = fit || s->memory[stage].fits == 0;
+        if (s->memory[stage].count < 96) return 0;
+    }
+    if (fit && steps < 1000) return 0;
+    for (int stage = 0; stage < 1 && fit; ++stage) henon_heiles_fit(&s->memory[stage]);
+    if (fit) s->fitted = s->steps;
+    return 1;
+}
+
+/* Blocks of steps where the motion can be foreseen, single steps elsewhere: the results differ by round-off only. */
 henon_heiles_status henon_heiles_integrate(henon_heiles_solver *s, double h, size_t steps)
 {
-    for (size_t k = 0; k < steps; ++k) {
+    henon_heiles_table table;
+    for (int stage = 0; stage < 1; ++stage) table.fits[stage] = -1;
+    while (steps > 0) {
+        if (s != NULL && henon_heiles_may_block(s, h, steps)) {
+            henon_heiles_tell(s, &table);
+            if (henon_heiles_block(s, &table)) {
+                steps -= henon_heiles_LANES;
+                s->setback /= 2;
+                continue;
+            }
+            s->setback = 2 * s->setback + henon_heiles_LANES > 1000 ? 1000 : 2 * s->setback + henon_heiles_LANES;
+            s->pause = s->setback;
+        }
         const henon_heiles_status status = henon_heiles_step(s, h);
         if (status != henon_heiles_OK) return status;
+        --steps;
     }
     return henon_heiles_OK;
 }

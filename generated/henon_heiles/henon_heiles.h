@@ -13,13 +13,12 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: d5ecfab8bc40ff2f7f74d06ad965afcdfdb1a9971ee387e217c63e343ce78c22
+ * body-sha256: c61370095d6f6b062f6cbda942cfac7f2952dbbbff50ee5423f34bac83b9bdf6
  */
 #ifndef HENON_HEILES_H
 #define HENON_HEILES_H
 
 #include <stddef.h>
-
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -46,19 +45,17 @@ typedef enum {
     henon_heiles_BAD_ARGUMENT    /* a null pointer, or a value that is not finite */
 } henon_heiles_status;
 
-/* Recent values of the unknown of the inner solve, for its starting guess. Two predictors compete: extrapolation by
-   backward differences, and a linear recurrence fitted to the last 80 values; they affect speed only. */
+/* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
+   fitted to the last 96 values. They affect speed only. */
 typedef struct {
-    int rows;  /* rows of lag in use */
-    int guess; /* how many of them the extrapolation adds up */
-    int count; /* values in past */
-    int slow;  /* how many of the last steps took more than one iteration */
-    int trained; /* whether weight is set */
-    double lag[8][henon_heiles_DIM]; /* backward differences, order by order */
-    double past[160][henon_heiles_DIM];   /* values, the latest last */
-    double weight[16][henon_heiles_DIM]; /* of past values, the latest first */
-    double predicted[2][henon_heiles_DIM]; /* what the two predictors say of the next value */
-    double error[2];                     /* their recent errors */
+    int count;    /* values in past */
+    int order;    /* how many of them the extrapolation uses */
+    int fits;     /* how often weight has been fitted */
+    int fitting;  /* whether the recurrence is the better guess */
+    int slow;     /* how many of the last steps took more than one iteration */
+    int patience; /* how many of those before the recurrence is fitted again */
+    double past[192][henon_heiles_DIM]; /* values, the latest last */
+    double weight[32][henon_heiles_DIM][8]; /* of past values, the latest first, for the next values */
 } henon_heiles_memory;
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with henon_heiles_init. */
@@ -70,6 +67,9 @@ typedef struct {
     henon_heiles_params params;
     double h;  /* the step size that coef belongs to */
     int ready; /* whether coef has been computed */
+    int pause;   /* steps to make singly before a block is tried */
+    int setback; /* the last pause, halved with every block that succeeds */
+    size_t fitted; /* steps when recurrences were last fitted for blocks */
     double coef[1][24]; /* what depends on params and h only, for each stage */
     henon_heiles_memory memory[1];
 } henon_heiles_solver;

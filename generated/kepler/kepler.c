@@ -13,12 +13,13 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: c4e8410b99dc728d13c70e59651e5937774564c81323a15ad6ca5a975f06af9a
+ * body-sha256: fd8dfaa9fbea7cfee3918d033702edd7839f34ea8cf8058abb8d18d66628267f
  */
 #include "kepler.h"
 
 #include <float.h>
 #include <math.h>
+#include <stdint.h>
 #include <string.h>
 
 const kepler_params kepler_default_params = { 1.0 };
@@ -537,119 +538,128 @@ static int kepler_solve(double matrix[16], double side[4])
     return 1;
 }
 
-/* Keep the backward differences of a vector that varies slowly from step to step (y - x), and choose how
-   many of them to extrapolate with next time: the first difference left out estimates the error of the guess. */
-static void kepler_difference(kepler_memory *memory, const double value[4])
+/* The guess for the next value (y), from earlier ones; 0 if there are none. */
+static int kepler_predict(const kepler_memory *memory, double value[4])
 {
-    double row[4], least = HUGE_VAL;
-    const int rows = memory->rows < 8 ? memory->rows + 1 : 8;
-    memcpy(row, value, sizeof row);
-    for (int k = 0; k < rows; ++k) {
-        double size = 0.0;
-        for (int i = 0; i < 4; ++i) {
-            const double before = k < memory->rows ? memory->lag[k][i] : 0.0;
-            memory->lag[k][i] = row[i];
-            size += fabs(row[i]);
-            row[i] -= before;
+    const int last = memory->count - 1;
+    double odd[4] = { 0.0 }, binomial = -1.0;
+    memset(value, 0, 4 * sizeof value[0]);
+    if (memory->fitting) {
+        for (int k = 0; k < 32; k += 2)
+            for (int i = 0; i < 4; ++i) {
+                value[i] += memory->weight[k][i][0] * memory->past[last - k][i];
+                odd[i] += memory->weight[k + 1][i][0] * memory->past[last - 1 - k][i];
+            }
+        for (int i = 0; i < 4; ++i) value[i] += odd[i];
+    } else {
+        for (int k = 0; k < memory->order && k <= last; ++k) {
+            binomial *= -(double)(memory->order - k) / (k + 1);
+            for (int i = 0; i < 4; ++i) value[i] += binomial * memory->past[last - k][i];
         }
+    }
+    return last >= 0;
+}
+
+/* Choose the guess that would have been best for a value that took several iterations. */
+static void kepler_judge(kepler_memory *memory, const double value[4])
+{
+    double row[8 + 1][4], guess[4], least = HUGE_VAL, fitted = HUGE_VAL;
+    const int rows = memory->count < 8 ? memory->count : 8;
+    memcpy(row[0], value, sizeof row[0]);
+    for (int k = 0; k < rows; ++k) memcpy(row[k + 1], memory->past[memory->count - 1 - k], sizeof row[0]);
+    for (int order = 1; order <= rows; ++order) { /* row[0] becomes the backward difference of this order */
+        double size = 0.0;
+        for (int k = 0; k <= rows - order; ++k)
+            for (int i = 0; i < 4; ++i) row[k][i] -= row[k + 1][i];
+        for (int i = 0; i < 4; ++i) size += fabs(row[0][i]);
         if (size < least) {
             least = size;
-            memory->guess = k;
+            memory->order = order;
         }
     }
-    memory->rows = rows;
-}
-
-/* The guess of the better predictor; zero without a history. Both are kept, to be judged by the solved value. */
-static void kepler_predict(kepler_memory *memory, double value[4])
-{
-    double(*guess)[4] = memory->predicted;
-    memset(memory->predicted, 0, sizeof memory->predicted);
-    for (int k = 0; k < memory->guess; ++k)
-        for (int i = 0; i < 4; ++i) guess[0][i] += memory->lag[k][i];
-    if (memory->trained) {
-        const int last = memory->count - 1;
-        double odd[4] = { 0.0 };
-        for (int k = 0; k < 16; k += 2)
-            for (int i = 0; i < 4; ++i) {
-                guess[1][i] += memory->weight[k][i] * memory->past[last - k][i];
-                odd[i] += memory->weight[k + 1][i] * memory->past[last - 1 - k][i];
-            }
-        for (int i = 0; i < 4; ++i) guess[1][i] += odd[i];
+    memory->fitting = memory->fits > 0;
+    if (memory->fitting && kepler_predict(memory, guess)) {
+        fitted = 0.0;
+        for (int i = 0; i < 4; ++i) fitted += fabs(value[i] - guess[i]);
     }
-    memcpy(value, guess[memory->trained && memory->error[1] <= memory->error[0]], 4 * sizeof value[0]);
+    memory->fitting = memory->fits > 0 && fitted <= least;
+    if (memory->order == 0) memory->order = 1;
 }
 
-/* Fit the recurrence value[m] = sum of weight[k] * value[m - 1 - k] to the history, component by component: ridge
-   least squares by modified Gram-Schmidt, the ridge at the level of rounding. */
+/* Fit the recurrences value[m + l] = sum of weight[k][..][l] * value[m - 1 - k], l = 0 ... 8 - 1, to the history,
+   component by component: ridge least squares by modified Gram-Schmidt, the ridge at the level of rounding. The last
+   8 columns of q are the right-hand sides. */
 static void kepler_train(kepler_memory *memory, int component)
 {
-    enum { ROWS = 80 - 16, ALL = 80 };
-    double q[16][ALL], r[16][16], b[ALL] = { 0.0 }, largest = 0.0;
-    const int first = memory->count - 80;
+    enum { WINDOW = 32, AHEAD = 8, ROWS = 96 - WINDOW - AHEAD + 1 };
+    double q[ROWS + WINDOW][WINDOW + AHEAD], r[WINDOW][WINDOW + AHEAD], largest = 0.0;
     memset(q, 0, sizeof q);
-    for (int i = 0; i < 80; ++i)
-        if (fabs(memory->past[first + i][component]) > largest) largest = fabs(memory->past[first + i][component]);
-    for (int k = 0; k < 16; ++k) {
-        for (int i = 0; i < ROWS; ++i) q[k][i] = memory->past[first + i + 16 - 1 - k][component];
-        q[k][ROWS + k] = 1e-13 * largest;
-    }
-    for (int i = 0; i < ROWS; ++i) b[i] = memory->past[first + i + 16][component];
-    for (int k = 0; k < 16; ++k) {
-        double norm = 0.0, along = 0.0;
-        for (int i = 0; i < ALL; ++i) norm += q[k][i] * q[k][i];
-        r[k][k] = sqrt(norm);
-        for (int i = 0; i < ALL; ++i) q[k][i] = norm > 0.0 ? q[k][i] / r[k][k] : 0.0;
-        for (int j = k + 1; j < 16; ++j) {
-            double dot = 0.0;
-            for (int i = 0; i < ALL; ++i) dot += q[k][i] * q[j][i];
-            r[k][j] = dot;
-            for (int i = 0; i < ALL; ++i) q[j][i] -= dot * q[k][i];
+    memset(r, 0, sizeof r);
+    for (int i = 0; i < ROWS; ++i) {
+        for (int j = 0; j < WINDOW + AHEAD; ++j) {
+            const int place = j < WINDOW ? WINDOW - 1 - j : j;
+            q[i][j] = memory->past[memory->count - 96 + i + place][component];
         }
-        for (int i = 0; i < ALL; ++i) along += q[k][i] * b[i];
-        memory->weight[k][component] = along;
-        for (int i = 0; i < ALL; ++i) b[i] -= along * q[k][i];
+        if (fabs(q[i][0]) > largest) largest = fabs(q[i][0]);
     }
-    for (int k = 16 - 1; k >= 0; --k) {
-        double sum = memory->weight[k][component];
-        for (int j = k + 1; j < 16; ++j) sum -= r[k][j] * memory->weight[j][component];
-        memory->weight[k][component] = r[k][k] > 0.0 ? sum / r[k][k] : 0.0;
+    for (int k = 0; k < WINDOW; ++k) q[ROWS + k][k] = 1e-13 * largest;
+    for (int k = 0; k < WINDOW; ++k) {
+        for (int i = 0; i < ROWS + WINDOW; ++i)
+            for (int j = k; j < WINDOW + AHEAD; ++j) r[k][j] += q[i][k] * q[i][j];
+        const double scale = r[k][k] > 0.0 ? 1.0 / r[k][k] : 0.0;
+        for (int j = k + 1; j < WINDOW + AHEAD; ++j) r[k][j] *= scale;
+        for (int i = 0; i < ROWS + WINDOW; ++i)
+            for (int j = k + 1; j < WINDOW + AHEAD; ++j) q[i][j] -= q[i][k] * r[k][j];
     }
+    for (int l = 0; l < AHEAD; ++l)
+        for (int k = WINDOW - 1; k >= 0; --k) {
+            double sum = r[k][WINDOW + l];
+            for (int j = k + 1; j < WINDOW; ++j) sum -= r[k][j] * memory->weight[j][component][l];
+            memory->weight[k][component][l] = sum;
+        }
 }
 
-/* Take in the solved value: update both predictors and their errors, and fit the recurrence when steps have been
-   taking several iterations. */
-static void kepler_remember(kepler_memory *memory, const double value[4], int iterations)
+/* Add a value to the history. */
+static void kepler_record(kepler_memory *memory, const double value[4])
 {
-    for (int kind = 0; kind < 2; ++kind) {
-        double error = 0.0;
-        for (int i = 0; i < 4; ++i) error += fabs(value[i] - memory->predicted[kind][i]);
-        memory->error[kind] = fmax(0.8 * memory->error[kind], error);
-    }
-    kepler_difference(memory, value);
-    if (memory->count == 160) {
-        memmove(memory->past, memory->past + 160 - 80, 80 * sizeof memory->past[0]);
-        memory->count = 80;
+    if (memory->count == 192) {
+        memmove(memory->past, memory->past + 192 - 96, 96 * sizeof memory->past[0]);
+        memory->count = 96;
     }
     memcpy(memory->past[memory->count++], value, 4 * sizeof value[0]);
-    memory->slow = iterations > 1 ? memory->slow + 1 : 0;
-    if (memory->slow >= 80 && memory->count >= 80) {
-        for (int i = 0; i < 4; ++i) kepler_train(memory, i);
-        memory->trained = 1;
-        memory->error[1] = 0.0;
-        memory->slow = -80;
-    }
 }
 
-/* x + change in compensated arithmetic. 0, and x as before, if the sum is not finite. */
-static int kepler_advance(kepler_solver *s, const double change[4])
+/* Fit the recurrence to the last values; with every time, wait longer before it is done again. */
+static void kepler_fit(kepler_memory *memory)
+{
+    for (int i = 0; i < 4; ++i) kepler_train(memory, i);
+    memory->fitting = 1;
+    ++memory->fits;
+    memory->slow = 0;
+    memory->patience = memory->patience < 10000 ? 2 * memory->patience + 96 : 20000;
+}
+
+/* Take in the solved value: what took one iteration needs no better guess. */
+static void kepler_remember(kepler_memory *memory, const double value[4], int iterations)
+{
+    if (iterations > 1) kepler_judge(memory, value);
+    kepler_record(memory, value);
+    memory->slow = iterations > 1 ? memory->slow + 1 : 0;
+    if (memory->slow > memory->patience && memory->count >= 96) kepler_fit(memory);
+}
+
+/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last
+   bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the
+   sum is not finite. */
+static int kepler_advance(kepler_solver *s, const double change[4], const double correction[4])
 {
     double x[4], carry[4];
     for (int i = 0; i < 4; ++i) {
-        const double addend = change[i] + s->carry[i];
-        x[i] = s->x[i] + addend;
-        const double added = x[i] - s->x[i];
-        carry[i] = (s->x[i] - (x[i] - added)) + (addend - added);
+        const double sum = s->x[i] + change[i], added = sum - s->x[i];
+        const double lost = (s->x[i] - (sum - added)) + (change[i] - added);
+        const double small = lost + (s->carry[i] + correction[i]);
+        x[i] = sum + small;
+        carry[i] = small - (x[i] - sum);
         if (!isfinite(x[i])) return 0;
     }
     memcpy(s->x, x, sizeof x);
@@ -673,20 +683,19 @@ static double kepler_size(const double y[4], const double delta[4])
 
 /* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the extrapolated guess, and advance. The
    increment is corrected to first order by the last Newton correction, so that correction costs no evaluation:
-   a correction is accepted when the error that remains after it, quadratic in it, is below 1e-18. */
+   a correction is accepted when the error that remains after it, quadratic in it, is below 1e-20. */
 static kepler_status kepler_attempt(kepler_solver *s, int stage)
 {
     const double *coef = s->coef[stage];
     kepler_memory *memory = &s->memory[stage];
     double y[4], delta[4], displacement[4], increment[4];
     double jacobian[16], increment_jacobian[16];
-    kepler_predict(memory, y);
-    for (int i = 0; i < 4; ++i) y[i] += s->x[i];
+    if (!kepler_predict(memory, y)) memcpy(y, s->x, sizeof y);
     double previous = HUGE_VAL;
     for (int iteration = 0; iteration < 20; ++iteration) {
         kepler_linearise(coef, y, displacement, increment, jacobian, increment_jacobian);
         ++s->evaluations;
-        for (int i = 0; i < 4; ++i) delta[i] = ((y[i] - s->x[i]) - s->carry[i]) + displacement[i];
+        for (int i = 0; i < 4; ++i) delta[i] = ((y[i] - s->x[i]) + displacement[i]) - s->carry[i];
         const int regular = kepler_solve(jacobian, delta);
         const double size = kepler_size(y, delta);
         if (!isfinite(size)) return kepler_NOT_FINITE;
@@ -695,14 +704,12 @@ static kepler_status kepler_attempt(kepler_solver *s, int stage)
         const double growth = size / (previous * previous);
         const double remaining = size * size * (growth > 1.0 ? growth : 1.0);
         /* The second test: corrections no longer shrink, the solve has reached the level of rounding. */
-        if (remaining <= 1e-18 || (previous < 1e-8 && size > 0.25 * previous)) {
-            double offset[4];
-            for (int i = 0; i < 4; ++i) {
-                offset[i] = y[i] - s->x[i];
-                for (int j = 0; j < 4; ++j) increment[i] -= increment_jacobian[i * 4 + j] * delta[j];
-            }
-            if (!kepler_advance(s, increment)) return kepler_NOT_FINITE;
-            kepler_remember(memory, offset, iteration + 1);
+        if (remaining <= 1e-20 || (previous < 1e-8 && size > 0.25 * previous)) {
+            double correction[4] = { 0.0 };
+            for (int i = 0; i < 4; ++i)
+                for (int j = 0; j < 4; ++j) correction[i] -= increment_jacobian[i * 4 + j] * delta[j];
+            if (!kepler_advance(s, increment, correction)) return kepler_NOT_FINITE;
+            kepler_remember(memory, y, iteration + 1);
             return kepler_OK;
         }
         previous = size;
@@ -719,7 +726,7 @@ static kepler_status kepler_stages(kepler_solver *s)
     memcpy(carry, s->carry, sizeof carry);
     for (int stage = 0; stage < 1; ++stage) {
         kepler_status status = kepler_attempt(s, stage);
-        if (status != kepler_OK && s->memory[stage].rows > 0) {
+        if (status != kepler_OK && s->memory[stage].count > 0) {
             memset(&s->memory[stage], 0, sizeof s->memory[stage]);
             status = kepler_attempt(s, stage);
         }
@@ -758,11 +765,570 @@ kepler_status kepler_step(kepler_solver *s, double h)
     return status;
 }
 
+/*
+ * Eight at a time: below, the formulas of a step are evaluated for 8 steps of a trajectory, or members of an
+ * ensemble, at once. Compilers make vector instructions of the loops over lanes.
+ */
+enum { kepler_LANES = 8 };
+
+#if defined(__GNUC__)
+typedef double kepler_lanes[kepler_LANES] __attribute__((aligned(64))); /* a value in each lane */
+#else
+typedef double kepler_lanes[kepler_LANES];
+#endif
+
+#if defined(__clang__)
+#define kepler_EACH_LANE _Pragma("clang loop vectorize(assume_safety)")
+#pragma clang diagnostic ignored "-Wpass-failed"
+#elif defined(__GNUC__)
+#define kepler_EACH_LANE _Pragma("GCC ivdep") _Pragma("GCC unroll 1")
+#else
+#define kepler_EACH_LANE
+#endif
+
+/* What all blocks share: coefficients, the same in each lane, and the recurrences by which they are foreseen. */
+typedef struct {
+    int fits[1]; /* the fit that weight is of; -1 for none */
+    kepler_lanes coef[1][118], weight[1][32][4];
+} kepler_table;
+
+/* A stage in all lanes, linear around y: a residual r of alpha(y) = x takes inverse r from y and gain r from the
+   increment. */
+typedef struct {
+    kepler_lanes y[4], displacement[4], increment[4], residual[4];
+    kepler_lanes inverse[16], slope[16], gain[16];
+} kepler_lines;
+
+/* kepler_linearise_lanes_part1 (part 1 of 2) */
+kepler_APART static void kepler_linearise_lanes_part1(kepler_lanes coef[restrict 118],
+                                                      kepler_lanes y[restrict 4],
+                                                      kepler_lanes displacement[restrict 4],
+                                                      kepler_lanes increment[restrict 4],
+                                                      kepler_lanes jacobian[restrict 16],
+                                                      kepler_lanes increment_jacobian[restrict 16],
+                                                      kepler_lanes work[restrict 36])
+{
+    kepler_EACH_LANE
+    for (int lane = 0; lane < kepler_LANES; ++lane) {
+        const double x = y[0][lane];
+        const double y_ = y[1][lane];
+        const double px = y[2][lane];
+        const double py = y[3][lane];
+        work[19][lane] = x * x;
+        work[7][lane] = y_ * y_;
+        const double t3 = work[19][lane] + work[7][lane];
+        work[9][lane] = 1.0 / sqrt(t3);
+        const double t5 = work[9][lane] * work[9][lane];
+        work[32][lane] = work[9][lane] * t5;
+        work[33][lane] = 1.0 / t3;
+        const double t8 = x * y_;
+        work[26][lane] = py * t8;
+        work[6][lane] = py * py;
+        const double t11 = coef[39][lane] * work[6][lane];
+        work[5][lane] = px * px;
+        const double t13 = coef[39][lane] * work[5][lane];
+        const double t14 = coef[18][lane] * work[19][lane];
+        const double t15 = px * work[7][lane];
+        const double t16 = coef[22][lane] * work[6][lane];
+        const double t17 = coef[40][lane] * work[9][lane];
+        const double t18 = t16 + t17;
+        work[3][lane] = y_ * (py * work[6][lane]);
+        const double t20 = px * y_;
+        const double t21 = py * t20;
+        const double t22 = py * y_;
+        const double t23 = px * x;
+        const double t24 = y_ * work[7][lane];
+        const double t25 = py * t24;
+        const double t26 = coef[25][lane] * work[9][lane];
+        const double t27 = coef[27][lane] * work[6][lane] + t26;
+        const double t28 = t8 * (py * work[9][lane]);
+        const double t29 = coef[23][lane] * work[6][lane];
+        const double t30 = t29 + t26;
+        const double t31 = work[7][lane] * t30;
+        const double t32 = coef[23][lane] * t21;
+        const double t33 = coef[27][lane] * work[5][lane] + t26;
+        const double t34 = work[9][lane] * (t25 * t27 + x * (coef[25][lane] * t28 + px * (t31 + x * (t32 + x * t33))));
+        const double t35 = x * (coef[22][lane] * work[3][lane] + px * (coef[41][lane] * t21 + x * (coef[43][lane] * work[5][lane] + t16)) + work[9][lane] * (coef[20][lane] * t22 + coef[42][lane] * t23 + t34));
+        const double t36 = coef[37][lane] * px + work[33][lane] * (coef[18][lane] * work[26][lane] + px * (t11 + (t13 + t14)) + work[9][lane] * (coef[38][lane] * px + work[9][lane] * (t15 * t18 + t35)));
+        const double p_px = coef[36][lane] * px + work[32][lane] * t36;
+        const double t37 = px * t8;
+        const double t38 = t13 + coef[18][lane] * work[7][lane];
+        const double t39 = py * work[19][lane];
+        const double t40 = coef[22][lane] * work[5][lane];
+        const double t41 = t40 + t17;
+        const double t42 = coef[41][lane] * work[6][lane];
+        const double t43 = t42 + t40;
+        const double t44 = t39 * t41 + y_ * (coef[43][lane] * work[3][lane] + px * (coef[22][lane] * t21 + x * t43) + work[9][lane] * (coef[20][lane] * t23 + coef[42][lane] * t22 + t34));
+        const double p_py = coef[36][lane] * py + work[32][lane] * (coef[37][lane] * py + work[33][lane] * (coef[18][lane] * t37 + py * (t11 + t38) + work[9][lane] * (coef[38][lane] * py + work[9][lane] * t44)));
+        const double t45 = coef[1][lane] * work[6][lane];
+        const double t46 = coef[4][lane] * work[5][lane];
+        const double t47 = t40 + t16;
+        const double t48 = work[9][lane] * (coef[20][lane] + work[7][lane] * (work[9][lane] * t27));
+        const double t49 = coef[10][lane] * work[7][lane];
+        const double t50 = coef[3][lane] * work[6][lane];
+        const double t51 = coef[19][lane] * work[26][lane];
+        work[27][lane] = coef[6][lane] * work[6][lane];
+        const double t53 = coef[10][lane] * work[19][lane];
+        const double t54 = coef[7][lane] * work[5][lane];
+        const double t55 = coef[8][lane] * work[7][lane];
+        work[31][lane] = coef[8][lane] * work[19][lane];
+        const double t57 = t55 + work[31][lane];
+        const double t58 = coef[2][lane] * work[6][lane] + coef[5][lane] * work[5][lane];
+        work[1][lane] = work[6][lane] * work[6][lane] * work[7][lane];
+        work[2][lane] = work[6][lane] * t15;
+        const double t61 = coef[23][lane] * work[3][lane];
+        const double t62 = coef[12][lane] * work[6][lane];
+        const double t63 = coef[13][lane] * work[5][lane] + coef[11][lane] * work[6][lane];
+        const double t64 = coef[21][lane] * t21;
+        const double t65 = coef[15][lane] * work[33][lane];
+        const double t66 = coef[16][lane] * work[9][lane];
+        const double t67 = coef[9][lane] + work[7][lane] * (t65 + work[6][lane] * (coef[17][lane] * work[6][lane] + t66));
+        const double t68 = py * (px * t24);
+        const double t69 = coef[26][lane] * work[9][lane];
+        const double t70 = coef[28][lane] * work[6][lane] + t69;
+        work[22][lane] = coef[9][lane] + work[19][lane] * (t65 + work[5][lane] * (coef[17][lane] * work[5][lane] + t66));
+        work[23][lane] = py * t23;
+        const double t73 = coef[28][lane] * work[5][lane] + t69;
+        const double t74 = work[5][lane] * work[6][lane];
+        const double t75 = t68 * t70 + x * (work[22][lane] + y_ * (work[23][lane] * t73 + y_ * (coef[35][lane] * t74 + work[9][lane] * (coef[16][lane] * work[6][lane] + (coef[16][lane] * work[5][lane] + coef[34][lane] * work[9][lane])))));
+        const double t76 = work[9][lane] * (work[7][lane] * t67 + x * t75);
+        const double t77 = coef[30][lane] + coef[12][lane] * work[1][lane] + px * (coef[14][lane] * work[2][lane] + x * (t61 + px * (coef[24][lane] * t21 + x * (coef[33][lane] * work[5][lane] + t62)))) + work[9][lane] * (work[7][lane] * t63 + x * (t64 + x * (coef[32][lane] * work[5][lane] + coef[31][lane] * work[6][lane])) + t76);
+        const double t78 = t21 * (t47 + t48) + x * (work[6][lane] * (t49 + t50) + px * (t51 + px * (work[27][lane] + (t53 + t54))) + work[9][lane] * (t57 + t58 + work[9][lane] * t77));
+        const double p_x = work[32][lane] * (coef[0][lane] * x + work[33][lane] * (coef[18][lane] * t21 + x * (t45 + t46) + work[9][lane] * (coef[29][lane] * x + work[9][lane] * t78)));
+        work[34][lane] = coef[4][lane] * work[6][lane];
+        work[35][lane] = coef[1][lane] * work[5][lane];
+        const double t81 = work[9][lane] * (coef[20][lane] + work[19][lane] * (work[9][lane] * t33));
+        work[25][lane] = coef[7][lane] * work[6][lane];
+        work[28][lane] = coef[3][lane] * work[5][lane];
+        work[30][lane] = coef[5][lane] * work[6][lane] + coef[2][lane] * work[5][lane];
+        const double t85 = coef[24][lane] * work[3][lane];
+        work[20][lane] = coef[14][lane] * work[6][lane] + coef[12][lane] * work[5][lane];
+        work[21][lane] = coef[13][lane] * work[6][lane] + coef[11][lane] * work[5][lane];
+        const double t88 = coef[30][lane] + coef[33][lane] * work[1][lane] + px * (coef[12][lane] * work[2][lane] + x * (t85 + px * (t32 + x * work[20][lane]))) + work[9][lane] * (work[7][lane] * (coef[32][lane] * work[6][lane] + coef[31][lane] * work[5][lane]) + x * (t64 + x * work[21][lane]) + t76);
+        const double t89 = work[23][lane] * (t47 + t81) + y_ * (work[6][lane] * (t49 + work[25][lane]) + px * (t51 + px * (work[27][lane] + (t53 + work[28][lane]))) + work[9][lane] * (t57 + work[30][lane] + work[9][lane] * t88));
+        const double p_y = work[32][lane] * (coef[0][lane] * y_ + work[33][lane] * (coef[18][lane] * work[23][lane] + y_ * (work[34][lane] + work[35][lane]) + work[9][lane] * (coef[29][lane] * y_ + work[9][lane] * t89)));
+        const double t90 = work[9][lane] * (t5 * t5);
+        const double t91 = coef[41][lane] * work[5][lane];
+        const double t92 = coef[103][lane] * work[6][lane];
+        const double t93 = coef[19][lane] * work[19][lane];
+        const double t94 = coef[106][lane] * work[6][lane];
+        const double t95 = coef[105][lane] * work[9][lane];
+        const double t96 = coef[21][lane] * t22;
+        work[4][lane] = coef[65][lane] * t21;
+        const double t98 = work[9][lane] * (t25 * t70 + x * (coef[26][lane] * t28 + px * (work[7][lane] * (coef[65][lane] * work[6][lane] + t69) + x * (work[4][lane] + x * t73))));
+        const double t99 = t15 * (t94 + t95) + x * (t61 + px * (coef[107][lane] * t21 + x * (t29 + coef[109][lane] * work[5][lane])) + work[9][lane] * (t96 + coef[108][lane] * t23 + t98));
+        const double t100 = t22 * (t91 + t16 + t48) + x * (t51 + px * (t92 + (coef[104][lane] * work[5][lane] + t93)) + work[9][lane] * (coef[102][lane] * px + work[9][lane] * t99));
+        const double t101 = t90 * (coef[18][lane] * t22 + coef[101][lane] * t23 + work[33][lane] * t100);
+        const double t102 = 0.5 * t101;
+        const double t103 = coef[18][lane] * (py * x) + coef[18][lane] * t20;
+        const double t104 = coef[114][lane] * work[9][lane];
+        const double t105 = coef[19][lane] * t37;
+        const double t106 = coef[19][lane] * work[7][lane];
+        const double t107 = coef[23][lane] * work[5][lane];
+        const double t108 = t107 + t26;
+        const double t109 = t39 * t108 + y_ * (t85 + px * (coef[113][lane] * t21 + x * (coef[112][lane] * work[5][lane] + t94)) + work[9][lane] * (coef[111][lane] * t23 + t96 + t98));
+        const double t110 = t20 * (t92 + t40 + work[9][lane] * (coef[110][lane] + work[7][lane] * (work[9][lane] * (t29 + t104)))) + x * (t105 + py * (t16 + (t91 + t106)) + work[9][lane] * (coef[20][lane] * py + work[9][lane] * t109));
+        const double t111 = t90 * (t103 + work[33][lane] * t110);
+        const double t112 = work[9][lane] * (t31 + x * (coef[112][lane] * t21 + x * t108));
+        const double t113 = work[9][lane] * (coef[42][lane] + t112);
+        const double t114 = t11 + (t14 + coef[115][lane] * work[5][lane]) + work[9][lane] * (coef[38][lane] + work[9][lane] * (work[7][lane] * t18 + x * (coef[116][lane] * t21 + x * (coef[116][lane] * work[5][lane] + t16 + t113))));
+        const double t115 = coef[36][lane] + work[32][lane] * (coef[37][lane] + work[33][lane] * t114);
+        const double t116 = px * py;
+        const double t117 = t116 * (coef[117][lane] + coef[43][lane] * (work[7][lane] * work[33][lane])) + x * (coef[43][lane] * (t23 * (py * work[33][lane])) + y_ * (coef[18][lane] + work[33][lane] * (t91 + t42 + work[9][lane] * (coef[20][lane] + t112))));
+        const double t118 = t90 * t117;
+        const double t119 = (-0.5) * t118;
+        const double t120 = t106 + coef[103][lane] * work[5][lane];
+        const double t121 = coef[24][lane] * work[5][lane];
+        const double t122 = coef[21][lane] * t23;
+        const double t123 = t39 * (t107 + t104) + y_ * (coef[112][lane] * work[3][lane] + px * (coef[106][lane] * t21 + x * (coef[113][lane] * work[6][lane] + t121)) + work[9][lane] * (t122 + coef[111][lane] * t22 + t98));
+        const double t124 = t20 * (t43 + work[9][lane] * (coef[20][lane] + work[7][lane] * (work[9][lane] * t30))) + x * (t105 + py * (t16 + t120) + work[9][lane] * (coef[110][lane] * py + work[9][lane] * t123));
+        const double t125 = t90 * (t103 + work[33][lane] * t124);
+        const double t126 = t39 * (coef[106][lane] * work[5][lane] + t95) + y_ * (coef[109][lane] * work[3][lane] + px * (t32 + x * (coef[107][lane] * work[6][lane] + t107)) + work[9][lane] * (t122 + coef[108][lane] * t22 + t98));
+        const double t127 = coef[101][lane] * t22 + coef[18][lane] * t23 + work[33][lane] * (t23 * (t43 + t81) + y_ * (t105 + py * (coef[104][lane] * work[6][lane] + t120) + work[9][lane] * (coef[102][lane] * py + work[9][lane] * t126)));
+        const double t128 = t90 * t127;
+        const double t129 = 0.5 * t128;
+        const double t130 = coef[115][lane] * work[6][lane] + t38 + work[9][lane] * (coef[38][lane] + work[9][lane] * (work[19][lane] * t41 + y_ * (coef[116][lane] * work[23][lane] + y_ * (coef[116][lane] * work[6][lane] + t40 + t113))));
+        const double t131 = coef[36][lane] + work[32][lane] * (coef[37][lane] + work[33][lane] * t130);
+        work[29][lane] = t53 + t49;
+        work[24][lane] = coef[68][lane] * work[9][lane];
+        work[14][lane] = coef[53][lane] * work[7][lane];
+        work[15][lane] = coef[61][lane] * work[26][lane];
+        work[16][lane] = coef[49][lane] * work[6][lane];
+        work[17][lane] = coef[53][lane] * work[19][lane];
+        work[18][lane] = coef[51][lane] * work[19][lane] + coef[51][lane] * work[7][lane];
+        const double t139 = coef[73][lane] + coef[35][lane] * work[1][lane] + px * (coef[56][lane] * work[2][lane] + x * (coef[65][lane] * work[3][lane] + px * (coef[67][lane] * t21 + x * (coef[35][lane] * work[6][lane] + coef[77][lane] * work[5][lane]))));
+        work[8][lane] = coef[63][lane] * t21;
+        const double t141 = coef[57][lane] * work[33][lane];
+        const double t142 = coef[58][lane] * work[9][lane];
+        work[10][lane] = work[7][lane] * (t141 + work[6][lane] * (coef[59][lane] * work[6][lane] + t142));
+        const double t144 = coef[69][lane] * work[9][lane];
+        work[11][lane] = t68 * (coef[71][lane] * work[6][lane] + t144);
+        work[12][lane] = work[19][lane] * (t141 + work[5][lane] * (coef[59][lane] * work[5][lane] + t142));
+        work[13][lane] = y_ * (work[23][lane] * (coef[71][lane] * work[5][lane] + t144) + y_ * (coef[79][lane] * t74 + work[9][lane] * (coef[58][lane] * work[6][lane] + (coef[58][lane] * work[5][lane] + coef[78][lane] * work[9][lane]))));
+        const double t148 = work[7][lane] * (coef[55][lane] * work[5][lane] + coef[54][lane] * work[6][lane]) + x * (work[8][lane] + x * (coef[76][lane] * work[5][lane] + coef[75][lane] * work[6][lane])) + work[9][lane] * (work[7][lane] * (coef[52][lane] + work[10][lane]) + x * (work[11][lane] + x * (coef[74][lane] + work[12][lane] + work[13][lane])));
+        const double t149 = work[6][lane] * (coef[46][lane] * work[6][lane] + work[14][lane]) + px * (work[15][lane] + px * (work[16][lane] + (work[17][lane] + coef[50][lane] * work[5][lane]))) + work[9][lane] * (work[18][lane] + (coef[45][lane] * work[6][lane] + coef[48][lane] * work[5][lane]) + work[9][lane] * (t139 + work[9][lane] * t148));
+        const double t150 = coef[30][lane] + work[7][lane] * (work[6][lane] * (coef[14][lane] * work[5][lane] + t62) + work[9][lane] * (t63 + work[9][lane] * t67)) + x * (t21 * (coef[64][lane] * work[6][lane] + coef[66][lane] * work[5][lane] + work[9][lane] * (coef[62][lane] + work[7][lane] * (work[9][lane] * (coef[70][lane] * work[6][lane] + work[24][lane])))) + x * t149);
+        const double t151 = work[5][lane] * (t54 + coef[47][lane] * work[19][lane]) + py * (coef[60][lane] * t37 + py * (t50 + coef[6][lane] * work[5][lane] + work[29][lane])) + work[9][lane] * (t55 + coef[72][lane] * work[19][lane] + t58 + work[9][lane] * t150);
+        const double t152 = work[32][lane] * (coef[0][lane] + work[33][lane] * (t45 + (coef[44][lane] * work[19][lane] + t46) + work[9][lane] * (coef[29][lane] + work[9][lane] * t151)));
+        const double t153 = coef[88][lane] + coef[91][lane] * work[1][lane] + px * (coef[93][lane] * work[2][lane] + x * (coef[95][lane] * work[3][lane] + px * (coef[96][lane] * t21 + x * (coef[99][lane] * work[6][lane] + coef[100][lane] * work[5][lane]))));
+        const double t154 = work[7][lane] * (coef[92][lane] * work[5][lane] + coef[90][lane] * work[6][lane]) + x * (coef[94][lane] * t21 + x * (coef[98][lane] * work[5][lane] + coef[97][lane] * work[6][lane])) + work[9][lane] * (work[7][lane] * (coef[89][lane] + work[10][lane]) + x * (work[11][lane] + x * (coef[89][lane] + work[12][lane] + work[13][lane])));
+        const double t155 = work[6][lane] * (coef[82][lane] * work[6][lane] + work[14][lane]) + px * (work[15][lane] + px * (coef[85][lane] * work[6][lane] + (work[17][lane] + coef[86][lane] * work[5][lane]))) + work[9][lane] * (coef[84][lane] * work[5][lane] + coef[81][lane] * work[6][lane] + work[18][lane] + work[9][lane] * (t153 + work[9][lane] * t154));
+        const double t156 = py * t15 * (coef[24][lane] * work[6][lane] + t107 + work[9][lane] * (coef[21][lane] + work[7][lane] * (work[9][lane] * t70))) + x * (work[23][lane] * (t29 + t121 + work[9][lane] * (coef[21][lane] + work[19][lane] * (work[9][lane] * t73))) + y_ * t155);
+        const double t157 = coef[80][lane] * (t8 * work[6][lane]) + px * (coef[83][lane] * t37 + py * (t47 + (t106 + t93))) + work[9][lane] * (coef[20][lane] * t116 + coef[87][lane] * t8 + work[9][lane] * t156);
+        const double t158 = t90 * (coef[18][lane] * t116 + coef[44][lane] * t8 + work[33][lane] * t157);
+        work[0][lane] = 0.5 * t158;
+        displacement[0][lane] = (-0.5) * p_px;
+        increment[0][lane] = p_px;
+        displacement[1][lane] = (-0.5) * p_py;
+        increment[1][lane] = p_py;
+        displacement[2][lane] = 0.5 * p_x;
+        increment[2][lane] = -p_x;
+        displacement[3][lane] = 0.5 * p_y;
+        increment[3][lane] = -p_y;
+        increment_jacobian[0][lane] = t101;
+        increment_jacobian[10][lane] = -t101;
+        jacobian[0][lane] = 1.0 - t102;
+        jacobian[10][lane] = 1.0 + t102;
+        jacobian[1][lane] = (-0.5) * t111;
+        jacobian[14][lane] = 0.5 * t111;
+        increment_jacobian[1][lane] = t111;
+        increment_jacobian[14][lane] = -t111;
+        jacobian[2][lane] = (-0.5) * t115;
+        increment_jacobian[2][lane] = t115;
+        increment_jacobian[3][lane] = t118;
+        increment_jacobian[6][lane] = t118;
+        jacobian[3][lane] = t119;
+        jacobian[6][lane] = t119;
+        jacobian[4][lane] = (-0.5) * t125;
+        jacobian[11][lane] = 0.5 * t125;
+        increment_jacobian[4][lane] = t125;
+        increment_jacobian[11][lane] = -t125;
+        increment_jacobian[5][lane] = t128;
+        increment_jacobian[15][lane] = -t128;
+        jacobian[5][lane] = 1.0 - t129;
+        jacobian[15][lane] = 1.0 + t129;
+        jacobian[7][lane] = (-0.5) * t131;
+        increment_jacobian[7][lane] = t131;
+        jacobian[8][lane] = 0.5 * t152;
+        increment_jacobian[8][lane] = -t152;
+        increment_jacobian[9][lane] = -t158;
+        increment_jacobian[12][lane] = -t158;
+        jacobian[9][lane] = work[0][lane];
+    }
+}
+
+/* kepler_linearise_lanes_part2 (part 2 of 2) */
+kepler_APART static void kepler_linearise_lanes_part2(kepler_lanes coef[restrict 118],
+                                                      kepler_lanes y[restrict 4],
+                                                      kepler_lanes displacement[restrict 4],
+                                                      kepler_lanes increment[restrict 4],
+                                                      kepler_lanes jacobian[restrict 16],
+                                                      kepler_lanes increment_jacobian[restrict 16],
+                                                      kepler_lanes work[restrict 36])
+{
+    (void)displacement;
+    (void)increment;
+    kepler_EACH_LANE
+    for (int lane = 0; lane < kepler_LANES; ++lane) {
+        const double x = y[0][lane];
+        const double y_ = y[1][lane];
+        const double px = y[2][lane];
+        const double t160 = coef[73][lane] + coef[77][lane] * work[1][lane] + px * (coef[35][lane] * work[2][lane] + x * (coef[67][lane] * work[3][lane] + px * (work[4][lane] + x * (coef[35][lane] * work[5][lane] + coef[56][lane] * work[6][lane]))));
+        const double t161 = work[7][lane] * (coef[75][lane] * work[5][lane] + coef[76][lane] * work[6][lane]) + x * (work[8][lane] + x * (coef[55][lane] * work[6][lane] + coef[54][lane] * work[5][lane])) + work[9][lane] * (work[7][lane] * (coef[74][lane] + work[10][lane]) + x * (work[11][lane] + x * (coef[52][lane] + work[12][lane] + work[13][lane])));
+        const double t162 = work[6][lane] * (coef[50][lane] * work[6][lane] + work[14][lane]) + px * (work[15][lane] + px * (work[16][lane] + (work[17][lane] + coef[46][lane] * work[5][lane]))) + work[9][lane] * (coef[45][lane] * work[5][lane] + coef[48][lane] * work[6][lane] + work[18][lane] + work[9][lane] * (t160 + work[9][lane] * t161));
+        const double t163 = coef[30][lane] + work[19][lane] * (work[5][lane] * work[20][lane] + work[9][lane] * (work[21][lane] + work[9][lane] * work[22][lane])) + y_ * (work[23][lane] * (coef[64][lane] * work[5][lane] + coef[66][lane] * work[6][lane] + work[9][lane] * (coef[62][lane] + work[19][lane] * (work[9][lane] * (coef[70][lane] * work[5][lane] + work[24][lane])))) + y_ * t162);
+        const double t164 = work[6][lane] * (coef[47][lane] * work[7][lane] + work[25][lane]) + px * (coef[60][lane] * work[26][lane] + px * (work[27][lane] + work[28][lane] + work[29][lane])) + work[9][lane] * (work[30][lane] + (work[31][lane] + coef[72][lane] * work[7][lane]) + work[9][lane] * t163);
+        const double t165 = work[32][lane] * (coef[0][lane] + work[33][lane] * (work[34][lane] + (work[35][lane] + coef[44][lane] * work[7][lane]) + work[9][lane] * (coef[29][lane] + work[9][lane] * t164)));
+        jacobian[12][lane] = work[0][lane];
+        jacobian[13][lane] = 0.5 * t165;
+        increment_jacobian[13][lane] = -t165;
+    }
+}
+
+/* kepler_linearise in all lanes. */
+static void kepler_linearise_lanes(kepler_lanes coef[restrict 118], kepler_lanes y[restrict 4],
+                                   kepler_lanes displacement[restrict 4], kepler_lanes increment[restrict 4],
+                                   kepler_lanes jacobian[restrict 16],
+                                   kepler_lanes increment_jacobian[restrict 16])
+{
+    kepler_lanes work[36];
+    kepler_linearise_lanes_part1(coef, y, displacement, increment, jacobian, increment_jacobian, work);
+    kepler_linearise_lanes_part2(coef, y, displacement, increment, jacobian, increment_jacobian, work);
+}
+
+/* kepler_invert in all lanes. */
+static void kepler_invert_lanes(kepler_lanes matrix[restrict 16], kepler_lanes slope[restrict 16],
+                                kepler_lanes inverse[restrict 16], kepler_lanes gain[restrict 16],
+                                kepler_lanes reciprocal[restrict 4])
+{
+    kepler_EACH_LANE
+    for (int lane = 0; lane < kepler_LANES; ++lane) {
+        const double t1 = 1.0 / matrix[0][lane];
+        const double t2 = matrix[1][lane] * t1;
+        const double t3 = 1.0 / (matrix[5][lane] - matrix[4][lane] * t2);
+        const double t4 = matrix[4][lane] * t1 * t3;
+        const double t5 = matrix[2][lane] * t1;
+        const double t6 = (matrix[6][lane] - matrix[4][lane] * t5) * t3;
+        const double t7 = t5 - t2 * t6;
+        const double t8 = matrix[9][lane] - matrix[8][lane] * t2;
+        const double t9 = 1.0 / (matrix[10][lane] - matrix[8][lane] * t5 - t8 * t6);
+        const double t10 = (t8 * t4 - matrix[8][lane] * t1) * t9;
+        const double t11 = matrix[3][lane] * t1;
+        const double t12 = (matrix[7][lane] - matrix[4][lane] * t11) * t3;
+        const double t13 = (matrix[11][lane] - matrix[8][lane] * t11 - t8 * t12) * t9;
+        const double t14 = t11 - t2 * t12 - t7 * t13;
+        const double t15 = matrix[13][lane] - matrix[12][lane] * t2;
+        const double t16 = matrix[14][lane] - matrix[12][lane] * t5 - t15 * t6;
+        const double t17 = 1.0 / (matrix[15][lane] - matrix[12][lane] * t11 - t15 * t12 - t16 * t13);
+        const double t18 = (t15 * t4 - matrix[12][lane] * t1 - t16 * t10) * t17;
+        const double t19 = t1 + t2 * t4 - t7 * t10 - t14 * t18;
+        const double t20 = t8 * t3 * t9;
+        const double t21 = (t16 * t20 - t15 * t3) * t17;
+        const double t22 = t7 * t20 - t2 * t3 - t14 * t21;
+        const double t23 = t16 * t9 * t17;
+        const double t24 = t14 * t23 - t7 * t9;
+        const double t25 = t14 * t17;
+        const double t26 = t12 - t6 * t13;
+        const double t27 = t4 + t6 * t10 + t26 * t18;
+        const double t28 = t3 + t6 * t20 - t26 * t21;
+        const double t29 = t26 * t23 - t6 * t9;
+        const double t30 = t26 * t17;
+        const double t31 = t10 - t13 * t18;
+        const double t32 = t20 + t13 * t21;
+        const double t33 = t9 + t13 * t23;
+        const double t34 = t13 * t17;
+        inverse[0][lane] = t19;
+        inverse[1][lane] = t22;
+        inverse[2][lane] = t24;
+        inverse[3][lane] = -t25;
+        inverse[4][lane] = -t27;
+        inverse[5][lane] = t28;
+        inverse[6][lane] = t29;
+        inverse[7][lane] = -t30;
+        inverse[8][lane] = t31;
+        inverse[9][lane] = -t32;
+        inverse[10][lane] = t33;
+        inverse[11][lane] = -t34;
+        inverse[12][lane] = t18;
+        inverse[13][lane] = t21;
+        inverse[14][lane] = -t23;
+        inverse[15][lane] = t17;
+        gain[0][lane] = slope[0][lane] * t19 - slope[1][lane] * t27 + (slope[3][lane] * t18 + slope[2][lane] * t31);
+        gain[1][lane] = slope[0][lane] * t22 + slope[1][lane] * t28 + (slope[3][lane] * t21 - slope[2][lane] * t32);
+        gain[2][lane] = slope[2][lane] * t33 - slope[3][lane] * t23 + (slope[0][lane] * t24 + slope[1][lane] * t29);
+        gain[3][lane] = slope[3][lane] * t17 - slope[2][lane] * t34 - (slope[1][lane] * t30 + slope[0][lane] * t25);
+        gain[4][lane] = slope[4][lane] * t19 - slope[5][lane] * t27 + (slope[7][lane] * t18 + slope[6][lane] * t31);
+        gain[5][lane] = slope[7][lane] * t21 - slope[6][lane] * t32 + (slope[5][lane] * t28 + slope[4][lane] * t22);
+        gain[6][lane] = slope[6][lane] * t33 - slope[7][lane] * t23 + (slope[5][lane] * t29 + slope[4][lane] * t24);
+        gain[7][lane] = slope[7][lane] * t17 - slope[6][lane] * t34 - (slope[4][lane] * t25 + slope[5][lane] * t30);
+        gain[8][lane] = slope[11][lane] * t18 + slope[10][lane] * t31 + (slope[8][lane] * t19 - slope[9][lane] * t27);
+        gain[9][lane] = slope[9][lane] * t28 + slope[8][lane] * t22 + (slope[11][lane] * t21 - slope[10][lane] * t32);
+        gain[10][lane] = slope[10][lane] * t33 - slope[11][lane] * t23 + (slope[9][lane] * t29 + slope[8][lane] * t24);
+        gain[11][lane] = slope[11][lane] * t17 - slope[10][lane] * t34 - (slope[9][lane] * t30 + slope[8][lane] * t25);
+        gain[12][lane] = slope[15][lane] * t18 + slope[14][lane] * t31 + (slope[12][lane] * t19 - slope[13][lane] * t27);
+        gain[13][lane] = slope[13][lane] * t28 + slope[12][lane] * t22 + (slope[15][lane] * t21 - slope[14][lane] * t32);
+        gain[14][lane] = slope[14][lane] * t33 - slope[15][lane] * t23 + (slope[13][lane] * t29 + slope[12][lane] * t24);
+        gain[15][lane] = slope[15][lane] * t17 - slope[14][lane] * t34 - (slope[12][lane] * t25 + slope[13][lane] * t30);
+        reciprocal[0][lane] = t1;
+        reciprocal[1][lane] = t3;
+        reciprocal[2][lane] = t9;
+        reciprocal[3][lane] = t17;
+    }
+}
+
+/* Everything about a stage at the points y. The matrices are I + O(h): where a pivot is far from 1, all is infinite. */
+static void kepler_tabulate(kepler_lanes coef[restrict], kepler_lines *line)
+{
+    kepler_lanes jacobian[16], reciprocal[4];
+    kepler_linearise_lanes(coef, line->y, line->displacement, line->increment, jacobian, line->slope);
+    kepler_invert_lanes(jacobian, line->slope, line->inverse, line->gain, reciprocal);
+    for (int i = 0; i < 4; ++i) {
+        kepler_EACH_LANE
+        for (int lane = 0; lane < kepler_LANES; ++lane)
+            line->inverse[i][lane] += fabs(reciprocal[i][lane]) < 1e3 ? 0.0 : HUGE_VAL;
+    }
+}
+
+/* kepler_size in all lanes, summed over the components. */
+static void kepler_sizes(kepler_lanes y[restrict 4], kepler_lanes delta[restrict 4],
+    kepler_lanes size)
+{
+    kepler_lanes norm = { 0.0 };
+    memset(size, 0, kepler_LANES * sizeof size[0]);
+    for (int i = 0; i < 4; ++i)
+        for (int lane = 0; lane < kepler_LANES; ++lane)
+            norm[lane] = 1e-6 * fabs(y[i][lane]) > norm[lane] ? 1e-6 * fabs(y[i][lane]) : norm[lane];
+    for (int i = 0; i < 4; ++i) {
+        kepler_EACH_LANE
+        for (int lane = 0; lane < kepler_LANES; ++lane)
+            size[lane] += fabs(delta[i][lane]) / (fabs(y[i][lane]) + norm[lane] + DBL_MIN);
+    }
+}
+
+/* The steps of a block one after the other, each along the lines of its lane. As X, the state with its carry, gains
+   increment - gain residual, the next residual follows from this one; X itself is added up apart. */
+static void kepler_chain(kepler_lines line[1], double x[4], double carry[4])
+{
+    double residual[4], sum[4], small[4];
+    for (int i = 0; i < 4; ++i) {
+        residual[i] = ((line->y[i][0] - x[i]) + line->displacement[i][0]) - carry[i];
+        sum[i] = x[i];
+        small[i] = carry[i];
+    }
+    for (int k = 0; k < 1 * kepler_LANES; ++k) {
+        const int lane = k / 1, after = (k + 1) / 1 % kepler_LANES;
+        kepler_lines *at = &line[k % 1], *next = &line[(k + 1) % 1];
+        double correction[4] = { 0.0 };
+        for (int i = 0; i < 4; ++i) {
+            at->residual[i][lane] = residual[i];
+            for (int j = 0; j < 4; ++j) correction[i] -= at->gain[i * 4 + j][lane] * residual[j];
+        }
+        for (int i = 0; i < 4; ++i) {
+            const double change = at->increment[i][lane], total = sum[i] + change, added = total - sum[i];
+            const double turn = (next->displacement[i][after] - at->displacement[i][lane]) - change;
+            residual[i] = ((next->y[i][after] - at->y[i][lane]) + turn) + (residual[i] - correction[i]);
+            small[i] += ((sum[i] - (total - added)) + (change - added)) + correction[i];
+            sum[i] = total;
+        }
+    }
+    for (int i = 0; i < 4; ++i) {
+        x[i] = sum[i] + small[i];
+        carry[i] = small[i] - (x[i] - sum[i]);
+    }
+}
+
+/* Bring the table up to date. */
+static void kepler_tell(const kepler_solver *s, kepler_table *table)
+{
+    for (int stage = 0; stage < 1; ++stage) {
+        if (table->fits[stage] == s->memory[stage].fits) continue;
+        table->fits[stage] = s->memory[stage].fits;
+        for (int k = 0; k < 118; ++k)
+            for (int lane = 0; lane < kepler_LANES; ++lane) table->coef[stage][k][lane] = s->coef[stage][k];
+        memcpy(table->weight[stage], s->memory[stage].weight, sizeof table->weight[stage]);
+    }
+}
+
+/* The guesses for the next kepler_LANES values. */
+static void kepler_foresee(const kepler_memory *memory, kepler_lanes weight[restrict][4],
+    kepler_lanes y[restrict 4])
+{
+    const int last = memory->count - 1;
+    for (int i = 0; i < 4; ++i) {
+        kepler_EACH_LANE
+        for (int lane = 0; lane < kepler_LANES; ++lane) {
+            double even = 0.0, odd = 0.0;
+            for (int k = 0; k < 32; k += 2) {
+                even += weight[k][i][lane] * memory->past[last - k][i];
+                odd += weight[k + 1][i][lane] * memory->past[last - 1 - k][i];
+            }
+            y[i][lane] = even + odd;
+        }
+    }
+}
+
+/* Correct y by the residuals that the chain found. The largest size of a correction; infinite if one is not finite. */
+static double kepler_correct(kepler_lines *line)
+{
+    kepler_lanes size, delta[4];
+    double largest = 0.0, total = 0.0;
+    memset(delta, 0, sizeof delta);
+    for (int i = 0; i < 4; ++i)
+        for (int j = 0; j < 4; ++j) {
+            kepler_EACH_LANE
+            for (int lane = 0; lane < kepler_LANES; ++lane)
+                delta[i][lane] += line->inverse[i * 4 + j][lane] * line->residual[j][lane];
+        }
+    kepler_sizes(line->y, delta, size);
+    for (int i = 0; i < 4; ++i)
+        for (int lane = 0; lane < kepler_LANES; ++lane) line->y[i][lane] -= delta[i][lane];
+    for (int lane = 0; lane < kepler_LANES; ++lane) {
+        total += size[lane];
+        largest = size[lane] > largest ? size[lane] : largest;
+    }
+    return isfinite(total) ? largest : HUGE_VAL;
+}
+
+/* kepler_LANES steps at once: guess the points of all, and correct them together until the error that remains is as
+   small as after a single step. 0, and the solver as before, where that does not come about. */
+static int kepler_block(kepler_solver *s, kepler_table *table)
+{
+    kepler_lines line[1];
+    double x[4], carry[4], value[4], previous = HUGE_VAL;
+    int passes = 0, solved = 0;
+    for (int stage = 0; stage < 1; ++stage)
+        kepler_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
+    while (!solved) {
+        double size = 0.0;
+        for (int stage = 0; stage < 1; ++stage) kepler_tabulate(table->coef[stage], &line[stage]);
+        memcpy(x, s->x, sizeof x);
+        memcpy(carry, s->carry, sizeof carry);
+        kepler_chain(line, x, carry);
+        for (int stage = 0; stage < 1; ++stage) size = fmax(size, kepler_correct(&line[stage]));
+        s->evaluations += 1 * kepler_LANES;
+        const double growth = size / (previous * previous);
+        /* The second test: after the square of so small a correction there is rounding only. */
+        solved = size * size * (growth > 1.0 ? growth : 1.0) <= 1e-20 || (previous < 1e-8 && size < 1e-10);
+        if (++passes == 4 || !(size < previous)) break;
+        previous = size;
+    }
+    for (int i = 0; i < 4; ++i)
+        if (!isfinite(x[i])) return 0;
+    if (!solved) return 0;
+    memcpy(s->x, x, sizeof x);
+    memcpy(s->carry, carry, sizeof carry);
+    s->steps += kepler_LANES;
+    for (int stage = 0; stage < 1; ++stage) {
+        kepler_memory *memory = &s->memory[stage];
+        for (int lane = 0; lane < kepler_LANES; ++lane) {
+            for (int i = 0; i < 4; ++i) value[i] = line[stage].y[i][lane];
+            kepler_record(memory, value);
+        }
+        memory->slow = passes > 1 ? memory->slow + kepler_LANES : 0;
+        if (memory->slow > memory->patience) kepler_fit(memory);
+    }
+    return 1;
+}
+
+/* Whether a block may be tried: not before there are recurrences to guess with, and not for a while after one that
+   failed. They take a thousand steps to repay. */
+static int kepler_may_block(kepler_solver *s, double h, size_t steps)
+{
+    int fit = s->setback > 0 && s->steps - s->fitted >= 1000;
+    if (!s->ready || memcmp(&h, &s->h, sizeof h) != 0 || steps < kepler_LANES) return 0;
+    if (s->pause > 0) {
+        --s->pause;
+        return 0;
+    }
+    for (int stage = 0; stage < 1; ++stage) {
+        fit = fit || s->memory[stage].fits == 0;
+        if (s->memory[stage].count < 96) return 0;
+    }
+    if (fit && steps < 1000) return 0;
+    for (int stage = 0; stage < 1 && fit; ++stage) kepler_fit(&s->memory[stage]);
+    if (fit) s->fitted = s->steps;
+    return 1;
+}
+
+/* Blocks of steps where the motion can be foreseen, single steps elsewhere: the results differ by round-off only. */
 kepler_status kepler_integrate(kepler_solver *s, double h, size_t steps)
 {
-    for (size_t k = 0; k < steps; ++k) {
+    kepler_table table;
+    for (int stage = 0; stage < 1; ++stage) table.fits[stage] = -1;
+    while (steps > 0) {
+        if (s != NULL && kepler_may_block(s, h, steps)) {
+            kepler_tell(s, &table);
+            if (kepler_block(s, &table)) {
+                steps -= kepler_LANES;
+                s->setback /= 2;
+                continue;
+            }
+            s->setback = 2 * s->setback + kepler_LANES > 1000 ? 1000 : 2 * s->setback + kepler_LANES;
+            s->pause = s->setback;
+        }
         const kepler_status status = kepler_step(s, h);
         if (status != kepler_OK) return status;
+        --steps;
     }
     return kepler_OK;
 }

@@ -13,12 +13,13 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: bdbc339ca3e93f72c7a3e93169b341f8748a01edbbb083907fe740445cef821b
+ * body-sha256: 47ed9785a580c34256b784e58feeb4e055a37e5444fb80e0a9f44ebfaf865768
  */
 #include "kowalevski_top.h"
 
 #include <float.h>
 #include <math.h>
+#include <stdint.h>
 #include <string.h>
 
 const kowalevski_top_params kowalevski_top_default_params = { 0 };
@@ -1050,119 +1051,128 @@ static int kowalevski_top_solve(double matrix[36], double side[6])
     return 1;
 }
 
-/* Keep the backward differences of a vector that varies slowly from step to step (y - x), and choose how
-   many of them to extrapolate with next time: the first difference left out estimates the error of the guess. */
-static void kowalevski_top_difference(kowalevski_top_memory *memory, const double value[6])
+/* The guess for the next value (y), from earlier ones; 0 if there are none. */
+static int kowalevski_top_predict(const kowalevski_top_memory *memory, double value[6])
 {
-    double row[6], least = HUGE_VAL;
-    const int rows = memory->rows < 8 ? memory->rows + 1 : 8;
-    memcpy(row, value, sizeof row);
-    for (int k = 0; k < rows; ++k) {
-        double size = 0.0;
-        for (int i = 0; i < 6; ++i) {
-            const double before = k < memory->rows ? memory->lag[k][i] : 0.0;
-            memory->lag[k][i] = row[i];
-            size += fabs(row[i]);
-            row[i] -= before;
+    const int last = memory->count - 1;
+    double odd[6] = { 0.0 }, binomial = -1.0;
+    memset(value, 0, 6 * sizeof value[0]);
+    if (memory->fitting) {
+        for (int k = 0; k < 32; k += 2)
+            for (int i = 0; i < 6; ++i) {
+                value[i] += memory->weight[k][i][0] * memory->past[last - k][i];
+                odd[i] += memory->weight[k + 1][i][0] * memory->past[last - 1 - k][i];
+            }
+        for (int i = 0; i < 6; ++i) value[i] += odd[i];
+    } else {
+        for (int k = 0; k < memory->order && k <= last; ++k) {
+            binomial *= -(double)(memory->order - k) / (k + 1);
+            for (int i = 0; i < 6; ++i) value[i] += binomial * memory->past[last - k][i];
         }
+    }
+    return last >= 0;
+}
+
+/* Choose the guess that would have been best for a value that took several iterations. */
+static void kowalevski_top_judge(kowalevski_top_memory *memory, const double value[6])
+{
+    double row[8 + 1][6], guess[6], least = HUGE_VAL, fitted = HUGE_VAL;
+    const int rows = memory->count < 8 ? memory->count : 8;
+    memcpy(row[0], value, sizeof row[0]);
+    for (int k = 0; k < rows; ++k) memcpy(row[k + 1], memory->past[memory->count - 1 - k], sizeof row[0]);
+    for (int order = 1; order <= rows; ++order) { /* row[0] becomes the backward difference of this order */
+        double size = 0.0;
+        for (int k = 0; k <= rows - order; ++k)
+            for (int i = 0; i < 6; ++i) row[k][i] -= row[k + 1][i];
+        for (int i = 0; i < 6; ++i) size += fabs(row[0][i]);
         if (size < least) {
             least = size;
-            memory->guess = k;
+            memory->order = order;
         }
     }
-    memory->rows = rows;
-}
-
-/* The guess of the better predictor; zero without a history. Both are kept, to be judged by the solved value. */
-static void kowalevski_top_predict(kowalevski_top_memory *memory, double value[6])
-{
-    double(*guess)[6] = memory->predicted;
-    memset(memory->predicted, 0, sizeof memory->predicted);
-    for (int k = 0; k < memory->guess; ++k)
-        for (int i = 0; i < 6; ++i) guess[0][i] += memory->lag[k][i];
-    if (memory->trained) {
-        const int last = memory->count - 1;
-        double odd[6] = { 0.0 };
-        for (int k = 0; k < 16; k += 2)
-            for (int i = 0; i < 6; ++i) {
-                guess[1][i] += memory->weight[k][i] * memory->past[last - k][i];
-                odd[i] += memory->weight[k + 1][i] * memory->past[last - 1 - k][i];
-            }
-        for (int i = 0; i < 6; ++i) guess[1][i] += odd[i];
+    memory->fitting = memory->fits > 0;
+    if (memory->fitting && kowalevski_top_predict(memory, guess)) {
+        fitted = 0.0;
+        for (int i = 0; i < 6; ++i) fitted += fabs(value[i] - guess[i]);
     }
-    memcpy(value, guess[memory->trained && memory->error[1] <= memory->error[0]], 6 * sizeof value[0]);
+    memory->fitting = memory->fits > 0 && fitted <= least;
+    if (memory->order == 0) memory->order = 1;
 }
 
-/* Fit the recurrence value[m] = sum of weight[k] * value[m - 1 - k] to the history, component by component: ridge
-   least squares by modified Gram-Schmidt, the ridge at the level of rounding. */
+/* Fit the recurrences value[m + l] = sum of weight[k][..][l] * value[m - 1 - k], l = 0 ... 8 - 1, to the history,
+   component by component: ridge least squares by modified Gram-Schmidt, the ridge at the level of rounding. The last
+   8 columns of q are the right-hand sides. */
 static void kowalevski_top_train(kowalevski_top_memory *memory, int component)
 {
-    enum { ROWS = 80 - 16, ALL = 80 };
-    double q[16][ALL], r[16][16], b[ALL] = { 0.0 }, largest = 0.0;
-    const int first = memory->count - 80;
+    enum { WINDOW = 32, AHEAD = 8, ROWS = 96 - WINDOW - AHEAD + 1 };
+    double q[ROWS + WINDOW][WINDOW + AHEAD], r[WINDOW][WINDOW + AHEAD], largest = 0.0;
     memset(q, 0, sizeof q);
-    for (int i = 0; i < 80; ++i)
-        if (fabs(memory->past[first + i][component]) > largest) largest = fabs(memory->past[first + i][component]);
-    for (int k = 0; k < 16; ++k) {
-        for (int i = 0; i < ROWS; ++i) q[k][i] = memory->past[first + i + 16 - 1 - k][component];
-        q[k][ROWS + k] = 1e-13 * largest;
-    }
-    for (int i = 0; i < ROWS; ++i) b[i] = memory->past[first + i + 16][component];
-    for (int k = 0; k < 16; ++k) {
-        double norm = 0.0, along = 0.0;
-        for (int i = 0; i < ALL; ++i) norm += q[k][i] * q[k][i];
-        r[k][k] = sqrt(norm);
-        for (int i = 0; i < ALL; ++i) q[k][i] = norm > 0.0 ? q[k][i] / r[k][k] : 0.0;
-        for (int j = k + 1; j < 16; ++j) {
-            double dot = 0.0;
-            for (int i = 0; i < ALL; ++i) dot += q[k][i] * q[j][i];
-            r[k][j] = dot;
-            for (int i = 0; i < ALL; ++i) q[j][i] -= dot * q[k][i];
+    memset(r, 0, sizeof r);
+    for (int i = 0; i < ROWS; ++i) {
+        for (int j = 0; j < WINDOW + AHEAD; ++j) {
+            const int place = j < WINDOW ? WINDOW - 1 - j : j;
+            q[i][j] = memory->past[memory->count - 96 + i + place][component];
         }
-        for (int i = 0; i < ALL; ++i) along += q[k][i] * b[i];
-        memory->weight[k][component] = along;
-        for (int i = 0; i < ALL; ++i) b[i] -= along * q[k][i];
+        if (fabs(q[i][0]) > largest) largest = fabs(q[i][0]);
     }
-    for (int k = 16 - 1; k >= 0; --k) {
-        double sum = memory->weight[k][component];
-        for (int j = k + 1; j < 16; ++j) sum -= r[k][j] * memory->weight[j][component];
-        memory->weight[k][component] = r[k][k] > 0.0 ? sum / r[k][k] : 0.0;
+    for (int k = 0; k < WINDOW; ++k) q[ROWS + k][k] = 1e-13 * largest;
+    for (int k = 0; k < WINDOW; ++k) {
+        for (int i = 0; i < ROWS + WINDOW; ++i)
+            for (int j = k; j < WINDOW + AHEAD; ++j) r[k][j] += q[i][k] * q[i][j];
+        const double scale = r[k][k] > 0.0 ? 1.0 / r[k][k] : 0.0;
+        for (int j = k + 1; j < WINDOW + AHEAD; ++j) r[k][j] *= scale;
+        for (int i = 0; i < ROWS + WINDOW; ++i)
+            for (int j = k + 1; j < WINDOW + AHEAD; ++j) q[i][j] -= q[i][k] * r[k][j];
     }
+    for (int l = 0; l < AHEAD; ++l)
+        for (int k = WINDOW - 1; k >= 0; --k) {
+            double sum = r[k][WINDOW + l];
+            for (int j = k + 1; j < WINDOW; ++j) sum -= r[k][j] * memory->weight[j][component][l];
+            memory->weight[k][component][l] = sum;
+        }
 }
 
-/* Take in the solved value: update both predictors and their errors, and fit the recurrence when steps have been
-   taking several iterations. */
-static void kowalevski_top_remember(kowalevski_top_memory *memory, const double value[6], int iterations)
+/* Add a value to the history. */
+static void kowalevski_top_record(kowalevski_top_memory *memory, const double value[6])
 {
-    for (int kind = 0; kind < 2; ++kind) {
-        double error = 0.0;
-        for (int i = 0; i < 6; ++i) error += fabs(value[i] - memory->predicted[kind][i]);
-        memory->error[kind] = fmax(0.8 * memory->error[kind], error);
-    }
-    kowalevski_top_difference(memory, value);
-    if (memory->count == 160) {
-        memmove(memory->past, memory->past + 160 - 80, 80 * sizeof memory->past[0]);
-        memory->count = 80;
+    if (memory->count == 192) {
+        memmove(memory->past, memory->past + 192 - 96, 96 * sizeof memory->past[0]);
+        memory->count = 96;
     }
     memcpy(memory->past[memory->count++], value, 6 * sizeof value[0]);
-    memory->slow = iterations > 1 ? memory->slow + 1 : 0;
-    if (memory->slow >= 80 && memory->count >= 80) {
-        for (int i = 0; i < 6; ++i) kowalevski_top_train(memory, i);
-        memory->trained = 1;
-        memory->error[1] = 0.0;
-        memory->slow = -80;
-    }
 }
 
-/* x + change in compensated arithmetic. 0, and x as before, if the sum is not finite. */
-static int kowalevski_top_advance(kowalevski_top_solver *s, const double change[6])
+/* Fit the recurrence to the last values; with every time, wait longer before it is done again. */
+static void kowalevski_top_fit(kowalevski_top_memory *memory)
+{
+    for (int i = 0; i < 6; ++i) kowalevski_top_train(memory, i);
+    memory->fitting = 1;
+    ++memory->fits;
+    memory->slow = 0;
+    memory->patience = memory->patience < 10000 ? 2 * memory->patience + 96 : 20000;
+}
+
+/* Take in the solved value: what took one iteration needs no better guess. */
+static void kowalevski_top_remember(kowalevski_top_memory *memory, const double value[6], int iterations)
+{
+    if (iterations > 1) kowalevski_top_judge(memory, value);
+    kowalevski_top_record(memory, value);
+    memory->slow = iterations > 1 ? memory->slow + 1 : 0;
+    if (memory->slow > memory->patience && memory->count >= 96) kowalevski_top_fit(memory);
+}
+
+/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last
+   bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the
+   sum is not finite. */
+static int kowalevski_top_advance(kowalevski_top_solver *s, const double change[6], const double correction[6])
 {
     double x[6], carry[6];
     for (int i = 0; i < 6; ++i) {
-        const double addend = change[i] + s->carry[i];
-        x[i] = s->x[i] + addend;
-        const double added = x[i] - s->x[i];
-        carry[i] = (s->x[i] - (x[i] - added)) + (addend - added);
+        const double sum = s->x[i] + change[i], added = sum - s->x[i];
+        const double lost = (s->x[i] - (sum - added)) + (change[i] - added);
+        const double small = lost + (s->carry[i] + correction[i]);
+        x[i] = sum + small;
+        carry[i] = small - (x[i] - sum);
         if (!isfinite(x[i])) return 0;
     }
     memcpy(s->x, x, sizeof x);
@@ -1186,20 +1196,19 @@ static double kowalevski_top_size(const double y[6], const double delta[6])
 
 /* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the extrapolated guess, and advance. The
    increment is corrected to first order by the last Newton correction, so that correction costs no evaluation:
-   a correction is accepted when the error that remains after it, quadratic in it, is below 1e-18. */
+   a correction is accepted when the error that remains after it, quadratic in it, is below 1e-20. */
 static kowalevski_top_status kowalevski_top_attempt(kowalevski_top_solver *s, int stage)
 {
     const double *coef = s->coef[stage];
     kowalevski_top_memory *memory = &s->memory[stage];
     double y[6], delta[6], displacement[6], increment[6];
     double jacobian[36], increment_jacobian[36];
-    kowalevski_top_predict(memory, y);
-    for (int i = 0; i < 6; ++i) y[i] += s->x[i];
+    if (!kowalevski_top_predict(memory, y)) memcpy(y, s->x, sizeof y);
     double previous = HUGE_VAL;
     for (int iteration = 0; iteration < 20; ++iteration) {
         kowalevski_top_linearise(coef, y, displacement, increment, jacobian, increment_jacobian);
         ++s->evaluations;
-        for (int i = 0; i < 6; ++i) delta[i] = ((y[i] - s->x[i]) - s->carry[i]) + displacement[i];
+        for (int i = 0; i < 6; ++i) delta[i] = ((y[i] - s->x[i]) + displacement[i]) - s->carry[i];
         const int regular = kowalevski_top_solve(jacobian, delta);
         const double size = kowalevski_top_size(y, delta);
         if (!isfinite(size)) return kowalevski_top_NOT_FINITE;
@@ -1208,14 +1217,12 @@ static kowalevski_top_status kowalevski_top_attempt(kowalevski_top_solver *s, in
         const double growth = size / (previous * previous);
         const double remaining = size * size * (growth > 1.0 ? growth : 1.0);
         /* The second test: corrections no longer shrink, the solve has reached the level of rounding. */
-        if (remaining <= 1e-18 || (previous < 1e-8 && size > 0.25 * previous)) {
-            double offset[6];
-            for (int i = 0; i < 6; ++i) {
-                offset[i] = y[i] - s->x[i];
-                for (int j = 0; j < 6; ++j) increment[i] -= increment_jacobian[i * 6 + j] * delta[j];
-            }
-            if (!kowalevski_top_advance(s, increment)) return kowalevski_top_NOT_FINITE;
-            kowalevski_top_remember(memory, offset, iteration + 1);
+        if (remaining <= 1e-20 || (previous < 1e-8 && size > 0.25 * previous)) {
+            double correction[6] = { 0.0 };
+            for (int i = 0; i < 6; ++i)
+                for (int j = 0; j < 6; ++j) correction[i] -= increment_jacobian[i * 6 + j] * delta[j];
+            if (!kowalevski_top_advance(s, increment, correction)) return kowalevski_top_NOT_FINITE;
+            kowalevski_top_remember(memory, y, iteration + 1);
             return kowalevski_top_OK;
         }
         previous = size;
@@ -1232,7 +1239,7 @@ static kowalevski_top_status kowalevski_top_stages(kowalevski_top_solver *s)
     memcpy(carry, s->carry, sizeof carry);
     for (int stage = 0; stage < 1; ++stage) {
         kowalevski_top_status status = kowalevski_top_attempt(s, stage);
-        if (status != kowalevski_top_OK && s->memory[stage].rows > 0) {
+        if (status != kowalevski_top_OK && s->memory[stage].count > 0) {
             memset(&s->memory[stage], 0, sizeof s->memory[stage]);
             status = kowalevski_top_attempt(s, stage);
         }
@@ -1272,11 +1279,1013 @@ kowalevski_top_status kowalevski_top_step(kowalevski_top_solver *s, double h)
     return status;
 }
 
+/*
+ * Eight at a time: below, the formulas of a step are evaluated for 8 steps of a trajectory, or members of an
+ * ensemble, at once. Compilers make vector instructions of the loops over lanes.
+ */
+enum { kowalevski_top_LANES = 8 };
+
+#if defined(__GNUC__)
+typedef double kowalevski_top_lanes[kowalevski_top_LANES] __attribute__((aligned(64))); /* a value in each lane */
+#else
+typedef double kowalevski_top_lanes[kowalevski_top_LANES];
+#endif
+
+#if defined(__clang__)
+#define kowalevski_top_EACH_LANE _Pragma("clang loop vectorize(assume_safety)")
+#pragma clang diagnostic ignored "-Wpass-failed"
+#elif defined(__GNUC__)
+#define kowalevski_top_EACH_LANE _Pragma("GCC ivdep") _Pragma("GCC unroll 1")
+#else
+#define kowalevski_top_EACH_LANE
+#endif
+
+/* What all blocks share: coefficients, the same in each lane, and the recurrences by which they are foreseen. */
+typedef struct {
+    int fits[1]; /* the fit that weight is of; -1 for none */
+    kowalevski_top_lanes coef[1][172], weight[1][32][6];
+} kowalevski_top_table;
+
+/* A stage in all lanes, linear around y: a residual r of alpha(y) = x takes inverse r from y and gain r from the
+   increment. */
+typedef struct {
+    kowalevski_top_lanes y[6], displacement[6], increment[6], residual[6];
+    kowalevski_top_lanes inverse[36], slope[36], gain[36];
+} kowalevski_top_lines;
+
+/* kowalevski_top_phi0 for the loops over lanes: no branches. Infinite beyond |s| = 4.0. */
+static inline double kowalevski_top_phi0_lane(double s)
+{
+    double sum = 1.455172475614865e-27;
+    sum = sum * s + 5.744790668872202e-26;
+    sum = sum * s + 2.267952452337683e-24;
+    sum = sum * s + 8.953517427037546e-23;
+    sum = sum * s + 3.534707039629467e-21;
+    sum = sum * s + 1.3954464685812522e-19;
+    sum = sum * s + 5.5090028283602295e-18;
+    sum = sum * s + 2.174868698558062e-16;
+    sum = sum * s + 8.586062056277845e-15;
+    sum = sum * s + 3.3896802963225827e-13;
+    sum = sum * s + 1.3382536530684679e-11;
+    sum = sum * s + 5.284190138687493e-10;
+    sum = sum * s + 2.08767569878681e-08;
+    sum = sum * s + 8.267195767195768e-07;
+    sum = sum * s + 3.306878306878307e-05;
+    sum = sum * s + 0.001388888888888889;
+    sum = sum * s + 0.08333333333333333;
+    return sum + (fabs(s) <= 4.0 ? 0.0 : HUGE_VAL);
+}
+
+/* kowalevski_top_phi1 for the loops over lanes: no branches. Infinite beyond |s| = 4.0. */
+static inline double kowalevski_top_phi1_lane(double s)
+{
+    double sum = 6.266191399131027e-28;
+    sum = sum * s + 2.328275960983784e-26;
+    sum = sum * s + 8.617186003308303e-25;
+    sum = sum * s + 3.1751334332727565e-23;
+    sum = sum * s + 1.163957265514881e-21;
+    sum = sum * s + 4.241648447555361e-20;
+    sum = sum * s + 1.5349911154393775e-18;
+    sum = sum * s + 5.5090028283602297e-17;
+    sum = sum * s + 1.9573818287022555e-15;
+    sum = sum * s + 6.868849645022276e-14;
+    sum = sum * s + 2.372776207425808e-12;
+    sum = sum * s + 8.029521918410807e-11;
+    sum = sum * s + 2.6420950693437467e-09;
+    sum = sum * s + 8.35070279514724e-08;
+    sum = sum * s + 2.48015873015873e-06;
+    sum = sum * s + 6.613756613756614e-05;
+    sum = sum * s + 0.001388888888888889;
+    return sum + (fabs(s) <= 4.0 ? 0.0 : HUGE_VAL);
+}
+
+/* kowalevski_top_phi2 for the loops over lanes: no branches. Infinite beyond |s| = 4.0. */
+static inline double kowalevski_top_phi2_lane(double s)
+{
+    double sum = 2.8570406826710835e-28;
+    sum = sum * s + 1.0025906238609643e-26;
+    sum = sum * s + 3.492413941475676e-25;
+    sum = sum * s + 1.2064060404631625e-23;
+    sum = sum * s + 4.127673463254583e-22;
+    sum = sum * s + 1.3967487186178574e-20;
+    sum = sum * s + 4.665813292310897e-19;
+    sum = sum * s + 1.5349911154393774e-17;
+    sum = sum * s + 4.958102545524207e-16;
+    sum = sum * s + 1.5659054629618044e-14;
+    sum = sum * s + 4.808194751515593e-13;
+    sum = sum * s + 1.4236657244554848e-11;
+    sum = sum * s + 4.0147609592054037e-10;
+    sum = sum * s + 1.0568380277374987e-08;
+    sum = sum * s + 2.505210838544172e-07;
+    sum = sum * s + 4.96031746031746e-06;
+    sum = sum * s + 6.613756613756614e-05;
+    return sum + (fabs(s) <= 4.0 ? 0.0 : HUGE_VAL);
+}
+
+/* kowalevski_top_linearise_lanes_part1 (part 1 of 3) */
+kowalevski_top_APART static void kowalevski_top_linearise_lanes_part1(kowalevski_top_lanes coef[restrict 172],
+                                                                      kowalevski_top_lanes y[restrict 6],
+                                                                      kowalevski_top_lanes displacement[restrict 6],
+                                                                      kowalevski_top_lanes increment[restrict 6],
+                                                                      kowalevski_top_lanes jacobian[restrict 36],
+                                                                      kowalevski_top_lanes increment_jacobian[restrict 36],
+                                                                      kowalevski_top_lanes work[restrict 274])
+{
+    (void)displacement;
+    (void)jacobian;
+    (void)increment_jacobian;
+    kowalevski_top_EACH_LANE
+    for (int lane = 0; lane < kowalevski_top_LANES; ++lane) {
+        const double P1 = y[0][lane];
+        const double P2 = y[1][lane];
+        const double P3 = y[2][lane];
+        const double G1 = y[3][lane];
+        const double G2 = y[4][lane];
+        const double G3 = y[5][lane];
+        work[54][lane] = G2 * P2;
+        work[29][lane] = P2 * P2;
+        work[126][lane] = coef[77][lane] * work[29][lane];
+        work[97][lane] = coef[38][lane] + G1 * coef[47][lane];
+        work[127][lane] = coef[10][lane] + G1 * coef[15][lane];
+        work[128][lane] = coef[18][lane] * work[29][lane];
+        const double t7 = G1 * (coef[3][lane] + G1 * coef[4][lane]);
+        work[57][lane] = G3 * G3;
+        work[77][lane] = G2 * G2;
+        const double t10 = coef[0][lane] + coef[2][lane] * work[77][lane];
+        const double t11 = work[29][lane] * (work[127][lane] + work[128][lane]) + (t7 + (coef[1][lane] * work[57][lane] + t10));
+        work[131][lane] = coef[64][lane] * work[54][lane];
+        work[30][lane] = P1 * P1;
+        work[132][lane] = coef[10][lane] + G1 * coef[59][lane] + (coef[86][lane] * work[29][lane] + coef[18][lane] * work[30][lane]);
+        work[27][lane] = P3 * P3;
+        work[135][lane] = coef[49][lane] * work[57][lane] + (coef[66][lane] + coef[67][lane] * work[77][lane]);
+        work[133][lane] = coef[69][lane] * work[77][lane] + coef[68][lane] * work[57][lane];
+        work[136][lane] = coef[21][lane] + G1 * coef[70][lane];
+        work[137][lane] = G3 * (G2 * P3);
+        work[138][lane] = coef[78][lane] + G1 * coef[79][lane];
+        work[115][lane] = coef[36][lane] * work[27][lane];
+        work[139][lane] = coef[80][lane] * work[29][lane];
+        const double t23 = coef[76][lane] * work[27][lane];
+        const double t24 = G1 * coef[55][lane];
+        work[140][lane] = G1 * (coef[5][lane] + t24) + (coef[53][lane] * work[57][lane] + (coef[24][lane] + coef[54][lane] * work[77][lane]));
+        const double t26 = work[27][lane] * (coef[72][lane] * work[77][lane] + coef[71][lane] * work[57][lane]) + work[135][lane] + G1 * (work[133][lane] + G1 * (coef[73][lane] * work[27][lane] + work[136][lane])) + P2 * (coef[74][lane] * work[137][lane] + P2 * (work[29][lane] * (work[138][lane] + (work[115][lane] + work[139][lane])) + (work[27][lane] * (t23 + (coef[12][lane] + G1 * coef[75][lane])) + work[140][lane])));
+        work[26][lane] = G3 * P3;
+        work[129][lane] = coef[81][lane] + G1 * coef[82][lane] + coef[83][lane] * work[27][lane];
+        work[103][lane] = G3 * (P2 * P3);
+        work[122][lane] = coef[49][lane] + G1 * coef[64][lane];
+        work[99][lane] = coef[39][lane] * work[29][lane];
+        work[123][lane] = coef[84][lane] * work[27][lane];
+        work[87][lane] = work[26][lane] * work[129][lane] + P2 * (coef[40][lane] * work[103][lane] + G2 * (work[122][lane] + (work[99][lane] + work[123][lane])));
+        work[120][lane] = G1 * coef[35][lane];
+        work[116][lane] = coef[34][lane] + work[120][lane];
+        work[71][lane] = coef[44][lane] * work[27][lane];
+        work[141][lane] = coef[37][lane] * work[29][lane];
+        const double t38 = G1 * coef[27][lane];
+        work[142][lane] = G1 * (coef[12][lane] + t38) + (coef[25][lane] * work[57][lane] + (coef[24][lane] + coef[26][lane] * work[77][lane]));
+        work[143][lane] = coef[39][lane] * work[54][lane];
+        const double t41 = coef[40][lane] * work[26][lane];
+        work[144][lane] = coef[78][lane] + G1 * coef[87][lane] + (work[141][lane] + coef[80][lane] * work[30][lane]);
+        const double t43 = work[29][lane] * (work[116][lane] + (work[71][lane] + work[141][lane])) + (work[27][lane] * (t23 + (coef[12][lane] + G1 * coef[85][lane])) + work[142][lane]) + P1 * (work[143][lane] + t41 + P1 * (work[115][lane] + work[144][lane]));
+        work[11][lane] = G3 * (work[54][lane] * (work[126][lane] + work[97][lane]) + P1 * (t11 + P1 * (work[131][lane] + P1 * work[132][lane]))) + P3 * (t26 + P1 * (work[87][lane] + P1 * t43));
+        work[95][lane] = work[11][lane] * work[11][lane];
+        work[40][lane] = coef[8][lane] * work[57][lane];
+        const double t46 = work[40][lane] + coef[9][lane] * work[77][lane];
+        work[45][lane] = coef[10][lane] + G1 * coef[11][lane];
+        work[42][lane] = coef[2][lane] * work[29][lane];
+        work[72][lane] = G1 * G1;
+        work[56][lane] = coef[19][lane] + coef[33][lane] * (work[72][lane] * work[29][lane]);
+        work[58][lane] = coef[20][lane] + G1 * coef[22][lane];
+        work[59][lane] = coef[31][lane] * work[29][lane];
+        work[39][lane] = P1 * P2;
+        work[60][lane] = G1 * work[39][lane];
+        work[61][lane] = coef[21][lane] + G1 * coef[23][lane];
+        work[62][lane] = coef[32][lane] * work[29][lane];
+        const double t57 = work[54][lane] * (t46 + G1 * (work[45][lane] + work[42][lane])) + P1 * (work[56][lane] + work[57][lane] * (work[58][lane] + (work[59][lane] + coef[43][lane] * work[30][lane])) + G2 * (coef[41][lane] * work[60][lane] + G2 * (work[61][lane] + (coef[44][lane] * work[30][lane] + work[62][lane]))));
+        work[32][lane] = coef[30][lane] * work[54][lane];
+        work[88][lane] = G1 * coef[39][lane];
+        work[33][lane] = coef[38][lane] + work[88][lane] + (coef[42][lane] * work[29][lane] + coef[46][lane] * work[30][lane]);
+        work[86][lane] = G3 * (t11 + P1 * (work[32][lane] + P1 * work[33][lane]));
+        const double t62 = coef[5][lane] + G1 * coef[6][lane] + coef[7][lane] * work[27][lane];
+        work[47][lane] = coef[12][lane] + G1 * coef[13][lane];
+        work[48][lane] = coef[17][lane] * work[29][lane];
+        work[46][lane] = coef[14][lane] * work[27][lane];
+        const double t66 = work[115][lane] + work[141][lane];
+        const double t67 = coef[29][lane] * work[27][lane];
+        work[55][lane] = work[29][lane] * (work[116][lane] + t66) + (work[27][lane] * (t67 + (coef[28][lane] + G1 * coef[14][lane])) + work[142][lane]);
+        const double t69 = coef[36][lane] * work[54][lane];
+        work[85][lane] = coef[45][lane] * work[29][lane];
+        work[117][lane] = coef[37][lane] * work[30][lane];
+        const double t72 = work[85][lane] + work[117][lane];
+        const double t73 = work[26][lane] * t62 + P2 * (coef[16][lane] * work[103][lane] + G2 * (work[47][lane] + (work[48][lane] + work[46][lane]))) + P1 * (work[55][lane] + P1 * (t69 + t41 + P1 * (work[115][lane] + (coef[34][lane] + G1 * coef[17][lane] + t72))));
+        work[20][lane] = t57 + P3 * (work[86][lane] + P3 * t73);
+        work[96][lane] = work[20][lane] * work[20][lane];
+        work[98][lane] = coef[48][lane] * work[27][lane];
+        work[102][lane] = work[26][lane] * (work[97][lane] + work[98][lane]);
+        work[105][lane] = coef[65][lane] * work[30][lane];
+        work[43][lane] = G3 * P1;
+        work[106][lane] = coef[64][lane] * work[43][lane];
+        work[82][lane] = coef[17][lane] * work[30][lane];
+        const double t81 = coef[58][lane] * work[29][lane];
+        work[121][lane] = coef[32][lane] * work[30][lane];
+        work[111][lane] = coef[12][lane] + work[121][lane];
+        work[112][lane] = coef[49][lane] + coef[31][lane] * work[30][lane];
+        work[109][lane] = coef[12][lane] + G1 * coef[52][lane];
+        work[110][lane] = coef[33][lane] * work[30][lane];
+        work[104][lane] = coef[59][lane] * work[29][lane];
+        work[107][lane] = coef[50][lane] * work[57][lane];
+        work[108][lane] = G2 * coef[51][lane];
+        work[119][lane] = work[107][lane] + G2 * (work[108][lane] + coef[1][lane] * work[39][lane]);
+        work[100][lane] = coef[57][lane] * work[54][lane];
+        work[68][lane] = coef[60][lane] + G1 * coef[61][lane];
+        work[118][lane] = coef[63][lane] * work[30][lane];
+        work[69][lane] = coef[63][lane] * work[29][lane];
+        work[101][lane] = work[68][lane] + (work[118][lane] + work[69][lane]);
+        work[124][lane] = G3 * (work[100][lane] + P1 * work[101][lane]);
+        const double t97 = G1 * coef[50][lane];
+        work[113][lane] = work[27][lane] * (t67 + (coef[28][lane] + G1 * coef[56][lane])) + work[140][lane];
+        work[114][lane] = coef[62][lane] * work[26][lane];
+        work[70][lane] = work[114][lane] + t69;
+        const double t101 = work[77][lane] * (t81 + work[111][lane]) + (coef[19][lane] + work[57][lane] * (work[48][lane] + work[112][lane])) + G1 * (G1 * (work[109][lane] + (work[110][lane] + work[104][lane])) + work[119][lane]) + P3 * (work[124][lane] + P3 * (work[29][lane] * (coef[34][lane] + t97 + t66) + work[113][lane] + P1 * (work[70][lane] + P1 * (work[115][lane] + (work[116][lane] + t72)))));
+        work[13][lane] = G2 * (work[102][lane] + P1 * (t46 + G1 * (work[105][lane] + work[45][lane]) + P3 * (work[106][lane] + P3 * (work[47][lane] + (work[82][lane] + work[46][lane]))))) + P2 * t101;
+        work[94][lane] = work[13][lane] * work[13][lane];
+        work[125][lane] = work[96][lane] + work[94][lane];
+        work[6][lane] = work[95][lane] + work[125][lane];
+        work[14][lane] = kowalevski_top_phi0_lane(work[6][lane]);
+        work[183][lane] = coef[87][lane] * work[29][lane];
+        work[182][lane] = coef[49][lane] + t97;
+        const double t108 = G1 * coef[90][lane];
+        work[185][lane] = G1 * (coef[38][lane] + t108);
+        work[186][lane] = coef[114][lane] + coef[108][lane] * work[77][lane];
+        work[28][lane] = coef[118][lane] * work[54][lane];
+        work[187][lane] = work[58][lane] + (work[59][lane] + coef[119][lane] * work[30][lane]);
+        work[184][lane] = coef[49][lane] + G1 * coef[68][lane] + coef[116][lane] * work[27][lane];
+        const double t114 = coef[16][lane] * work[27][lane];
+        work[130][lane] = t7 + (coef[117][lane] * work[57][lane] + t10);
+        work[31][lane] = work[29][lane] * (work[127][lane] + (t114 + work[128][lane])) + (work[27][lane] * t62 + work[130][lane]);
+        const double t117 = work[26][lane] * work[184][lane] + P2 * (coef[53][lane] * work[103][lane] + G2 * (work[97][lane] + (work[126][lane] + work[98][lane]))) + P1 * (work[31][lane] + P1 * (coef[25][lane] * work[26][lane] + work[131][lane] + P1 * (t114 + work[132][lane])));
+        work[8][lane] = G3 * (work[29][lane] * (work[183][lane] + work[182][lane]) + (work[185][lane] + (coef[115][lane] * work[57][lane] + work[186][lane])) + P1 * (work[28][lane] + P1 * work[187][lane])) + P3 * t117;
+        work[63][lane] = G3 * work[20][lane];
+        work[34][lane] = G1 * work[11][lane];
+        work[24][lane] = work[63][lane] - work[34][lane];
+        work[173][lane] = work[27][lane] * (coef[111][lane] * work[27][lane] + (coef[67][lane] + G1 * coef[69][lane]));
+        const double t122 = G1 * coef[91][lane];
+        work[174][lane] = G1 * (coef[110][lane] + t122);
+        work[175][lane] = coef[108][lane] * work[57][lane];
+        work[44][lane] = coef[113][lane] * work[26][lane];
+        work[176][lane] = coef[26][lane] * work[27][lane];
+        work[49][lane] = coef[36][lane] * work[30][lane];
+        work[172][lane] = coef[12][lane] + G1 * coef[51][lane] + (coef[112][lane] * work[29][lane] + coef[54][lane] * work[27][lane]);
+        work[41][lane] = G2 * coef[90][lane];
+        work[145][lane] = work[105][lane] + work[42][lane];
+        const double t131 = P1 * (work[40][lane] + G2 * (work[41][lane] + coef[32][lane] * work[39][lane]) + G1 * (work[45][lane] + work[145][lane]) + P3 * (work[106][lane] + P3 * (work[46][lane] + (work[47][lane] + (work[48][lane] + work[82][lane])))));
+        work[0][lane] = G2 * (work[173][lane] + (work[174][lane] + (work[175][lane] + (coef[107][lane] + coef[109][lane] * work[77][lane]))) + P1 * (work[44][lane] + P1 * (work[61][lane] + (work[176][lane] + work[49][lane])))) + P2 * (work[102][lane] + P2 * (coef[77][lane] * work[103][lane] + G2 * work[172][lane]) + t131);
+        work[51][lane] = G1 * work[13][lane];
+        work[50][lane] = G2 * work[20][lane];
+        work[25][lane] = work[51][lane] - work[50][lane];
+        work[148][lane] = G2 * P1;
+        work[78][lane] = coef[10][lane] + G1 * coef[102][lane];
+        work[149][lane] = work[110][lane] + t81;
+        const double t138 = work[148][lane] * (work[105][lane] + work[78][lane]) + P2 * (coef[79][lane] * work[57][lane] + G2 * (G2 * coef[96][lane] + coef[2][lane] * work[39][lane]) + G1 * (coef[12][lane] + G1 * coef[97][lane] + work[149][lane]));
+        work[146][lane] = coef[47][lane] * work[54][lane];
+        work[79][lane] = coef[3][lane] + G1 * coef[101][lane];
+        work[80][lane] = coef[15][lane] * work[29][lane];
+        work[147][lane] = work[79][lane] + (work[80][lane] + coef[59][lane] * work[30][lane]);
+        work[134][lane] = G3 * (work[146][lane] + P1 * work[147][lane]);
+        work[150][lane] = coef[95][lane] * work[27][lane];
+        const double t145 = coef[93][lane] * work[77][lane] + coef[92][lane] * work[57][lane] + G1 * (work[150][lane] + (coef[21][lane] + G1 * coef[94][lane])) + work[29][lane] * (coef[98][lane] + t24 + (coef[99][lane] * work[27][lane] + coef[100][lane] * work[29][lane]));
+        work[81][lane] = coef[13][lane] * work[54][lane] + coef[6][lane] * work[26][lane];
+        work[2][lane] = work[77][lane] * (coef[89][lane] + t122 + coef[104][lane] * work[30][lane]) + (coef[66][lane] + work[57][lane] * (coef[103][lane] * work[30][lane] + (coef[88][lane] + t108))) + P2 * t138 + P3 * (work[134][lane] + P3 * (t145 + P1 * (work[81][lane] + P1 * (coef[105][lane] * work[27][lane] + (coef[28][lane] + t38 + (coef[97][lane] * work[29][lane] + coef[106][lane] * work[30][lane]))))));
+        work[64][lane] = G3 * work[2][lane];
+        work[90][lane] = G1 * work[8][lane];
+        work[65][lane] = P3 * work[20][lane];
+        work[89][lane] = P1 * work[11][lane];
+        work[21][lane] = work[64][lane] - work[90][lane] + (work[65][lane] - work[89][lane]);
+        work[73][lane] = G1 * work[0][lane];
+        work[67][lane] = G2 * work[2][lane];
+        work[74][lane] = P1 * work[13][lane];
+        work[66][lane] = P2 * work[20][lane];
+        work[22][lane] = work[73][lane] - work[67][lane] + (work[74][lane] - work[66][lane]);
+        work[7][lane] = work[8][lane] * work[24][lane] - work[0][lane] * work[25][lane] + (work[11][lane] * work[21][lane] - work[13][lane] * work[22][lane]);
+        work[15][lane] = kowalevski_top_phi1_lane(work[6][lane]);
+        work[38][lane] = G2 * work[11][lane];
+        work[37][lane] = G3 * work[13][lane];
+        work[23][lane] = work[38][lane] - work[37][lane];
+        work[201][lane] = work[13][lane] * work[23][lane];
+        work[200][lane] = work[20][lane] * work[24][lane];
+        work[17][lane] = work[201][lane] - work[200][lane];
+        work[251][lane] = work[20][lane] * work[17][lane];
+        work[36][lane] = work[11][lane] * work[24][lane];
+        work[35][lane] = work[13][lane] * work[25][lane];
+        work[1][lane] = work[36][lane] - work[35][lane];
+        work[250][lane] = work[11][lane] * work[1][lane];
+        work[9][lane] = work[251][lane] - work[250][lane];
+        work[53][lane] = work[13][lane] * work[1][lane];
+        work[84][lane] = work[20][lane] * work[25][lane];
+        work[83][lane] = work[11][lane] * work[23][lane];
+        work[3][lane] = work[84][lane] - work[83][lane];
+        work[52][lane] = work[20][lane] * work[3][lane];
+        work[10][lane] = work[53][lane] - work[52][lane];
+        work[91][lane] = G2 * work[8][lane];
+        work[76][lane] = G3 * work[0][lane];
+        work[92][lane] = P2 * work[11][lane];
+        work[75][lane] = P3 * work[13][lane];
+        work[16][lane] = work[91][lane] - work[76][lane] + (work[92][lane] - work[75][lane]);
+        work[19][lane] = work[0][lane] * work[23][lane] - work[2][lane] * work[24][lane] + (work[13][lane] * work[16][lane] - work[20][lane] * work[21][lane]);
+        work[256][lane] = work[20][lane] * work[19][lane];
+        work[93][lane] = work[11][lane] * work[7][lane];
+        work[12][lane] = work[2][lane] * work[17][lane] - work[8][lane] * work[1][lane] + (work[256][lane] - work[93][lane]);
+        work[4][lane] = work[13][lane] * work[7][lane];
+        work[18][lane] = work[2][lane] * work[25][lane] - work[8][lane] * work[23][lane] + (work[20][lane] * work[22][lane] - work[11][lane] * work[16][lane]);
+        work[5][lane] = work[20][lane] * work[18][lane];
+        increment[4][lane] = work[24][lane];
+        increment[5][lane] = work[25][lane];
+        increment[1][lane] = work[21][lane];
+        increment[2][lane] = work[22][lane];
+        increment[3][lane] = work[23][lane];
+        increment[0][lane] = work[16][lane];
+    }
+}
+
+/* kowalevski_top_linearise_lanes_part2 (part 2 of 3) */
+kowalevski_top_APART static void kowalevski_top_linearise_lanes_part2(kowalevski_top_lanes coef[restrict 172],
+                                                                      kowalevski_top_lanes y[restrict 6],
+                                                                      kowalevski_top_lanes displacement[restrict 6],
+                                                                      kowalevski_top_lanes increment[restrict 6],
+                                                                      kowalevski_top_lanes jacobian[restrict 36],
+                                                                      kowalevski_top_lanes increment_jacobian[restrict 36],
+                                                                      kowalevski_top_lanes work[restrict 274])
+{
+    (void)increment;
+    kowalevski_top_EACH_LANE
+    for (int lane = 0; lane < kowalevski_top_LANES; ++lane) {
+        const double P1 = y[0][lane];
+        const double P2 = y[1][lane];
+        const double P3 = y[2][lane];
+        const double G1 = y[3][lane];
+        const double G2 = y[4][lane];
+        const double G3 = y[5][lane];
+        work[233][lane] = work[0][lane] * work[1][lane] - work[2][lane] * work[3][lane] + (work[4][lane] - work[5][lane]);
+        const double t190 = work[6][lane] * work[7][lane] + (work[8][lane] * work[9][lane] - work[0][lane] * work[10][lane] + (work[11][lane] * work[12][lane] - work[13][lane] * work[233][lane]));
+        work[206][lane] = work[11][lane] * work[3][lane];
+        work[205][lane] = work[13][lane] * work[17][lane];
+        work[247][lane] = work[206][lane] - work[205][lane];
+        work[215][lane] = work[11][lane] * work[18][lane];
+        work[260][lane] = work[13][lane] * work[19][lane];
+        work[218][lane] = work[8][lane] * work[3][lane] - work[0][lane] * work[17][lane] + (work[215][lane] - work[260][lane]);
+        work[220][lane] = work[6][lane] * work[18][lane] + (work[2][lane] * work[10][lane] - work[8][lane] * work[247][lane] + (work[20][lane] * work[233][lane] - work[11][lane] * work[218][lane]));
+        work[255][lane] = work[6][lane] * work[19][lane] + (work[0][lane] * work[247][lane] - work[2][lane] * work[9][lane] + (work[13][lane] * work[218][lane] - work[20][lane] * work[12][lane]));
+        work[264][lane] = work[6][lane] * work[1][lane] + (work[11][lane] * work[9][lane] - work[13][lane] * work[10][lane]);
+        work[272][lane] = work[6][lane] * work[3][lane] + (work[20][lane] * work[10][lane] - work[11][lane] * work[247][lane]);
+        work[273][lane] = work[6][lane] * work[17][lane] + (work[13][lane] * work[247][lane] - work[20][lane] * work[9][lane]);
+        const double t202 = coef[135][lane] * work[26][lane];
+        const double t203 = coef[40][lane] * work[27][lane];
+        work[190][lane] = G3 * (work[28][lane] + P1 * (coef[141][lane] + G1 * coef[142][lane] + (coef[130][lane] * work[29][lane] + coef[143][lane] * work[30][lane]))) + P3 * (work[31][lane] + P1 * (t202 + work[32][lane] + P1 * (t203 + work[33][lane])));
+        const double t205 = work[24][lane] - work[34][lane];
+        work[263][lane] = t205 * work[14][lane];
+        work[265][lane] = t205 * work[6][lane];
+        const double t208 = G2 * work[13][lane];
+        const double t209 = G1 * work[20][lane];
+        work[203][lane] = t208 + t209;
+        const double t211 = work[20][lane] * work[203][lane];
+        const double t212 = work[11][lane] * t205;
+        work[246][lane] = work[35][lane] - work[36][lane] + (t211 - t212);
+        const double t214 = work[13][lane] * t205;
+        work[204][lane] = work[37][lane] - work[38][lane] - work[38][lane];
+        work[207][lane] = t214 - work[20][lane] * work[204][lane];
+        work[249][lane] = 0.5 * G2;
+        work[157][lane] = work[263][lane] - work[15][lane] * (work[265][lane] + (work[9][lane] + (work[11][lane] * work[246][lane] - work[13][lane] * work[207][lane]))) - work[249][lane];
+        const double t219 = coef[131][lane] * work[39][lane];
+        const double t220 = work[40][lane] + G2 * (work[41][lane] + t219);
+        const double t221 = coef[41][lane] * work[30][lane];
+        const double t222 = t221 + work[42][lane];
+        const double t223 = coef[30][lane] * work[43][lane];
+        work[179][lane] = G2 * (work[44][lane] + P1 * (coef[67][lane] + G1 * coef[140][lane] + (coef[138][lane] * work[30][lane] + coef[136][lane] * work[27][lane]))) + P2 * (t220 + G1 * (work[45][lane] + t222) + P3 * (t223 + P3 * (work[46][lane] + (work[47][lane] + (work[48][lane] + work[49][lane])))));
+        work[211][lane] = 0.5 * G3;
+        const double t226 = work[50][lane] - work[51][lane] - work[51][lane];
+        work[199][lane] = work[23][lane] - work[37][lane];
+        const double t228 = work[20][lane] * work[199][lane];
+        work[248][lane] = t228 - work[11][lane] * t226;
+        const double t230 = G3 * work[11][lane];
+        work[198][lane] = t230 + t209;
+        const double t232 = work[20][lane] * work[198][lane];
+        work[202][lane] = work[1][lane] + (work[13][lane] * t226 - t232);
+        work[155][lane] = work[211][lane] + (t226 * work[14][lane] - work[15][lane] * (work[6][lane] * t226 + (work[52][lane] - work[53][lane] + (work[11][lane] * work[248][lane] - work[13][lane] * work[202][lane]))));
+        const double t235 = coef[122][lane] * work[29][lane];
+        const double t236 = coef[121][lane] * work[26][lane];
+        const double t237 = coef[44][lane] * work[54][lane];
+        const double t238 = t236 + t237;
+        const double t239 = coef[126][lane] * work[27][lane];
+        const double t240 = coef[127][lane] * work[29][lane];
+        const double t241 = G3 * (work[32][lane] + P1 * (coef[89][lane] + G1 * coef[120][lane] + (t235 + coef[128][lane] * work[30][lane]))) + P3 * (work[55][lane] + P1 * (t238 + P1 * (t239 + (coef[125][lane] + G1 * coef[36][lane] + (t240 + coef[129][lane] * work[30][lane])))));
+        work[239][lane] = work[56][lane] + work[57][lane] * (work[58][lane] + (work[59][lane] + coef[123][lane] * work[30][lane])) + G2 * (coef[115][lane] * work[60][lane] + G2 * (work[61][lane] + (coef[124][lane] * work[30][lane] + work[62][lane]))) + P3 * t241;
+        const double t243 = G3 * work[8][lane];
+        const double t244 = G2 * work[0][lane];
+        const double t245 = P3 * work[11][lane];
+        const double t246 = P2 * work[13][lane];
+        const double t247 = t243 + t244 + (t245 + t246);
+        work[235][lane] = work[20][lane] * work[15][lane];
+        work[228][lane] = work[63][lane] + work[24][lane];
+        const double t250 = t230 + t208;
+        const double t251 = work[11][lane] * t250;
+        work[257][lane] = work[17][lane] - work[20][lane] * work[228][lane] - t251;
+        const double t253 = work[13][lane] * t250;
+        work[208][lane] = work[25][lane] - work[50][lane];
+        const double t255 = work[20][lane] * work[208][lane];
+        work[232][lane] = t253 - (t255 + work[3][lane]);
+        work[229][lane] = work[64][lane] + (work[65][lane] + work[21][lane]);
+        work[258][lane] = work[19][lane] - work[20][lane] * work[229][lane] - work[11][lane] * t247 - (work[8][lane] * t250 + work[2][lane] * work[228][lane]);
+        work[230][lane] = work[22][lane] - work[66][lane] - work[67][lane];
+        work[234][lane] = work[0][lane] * t250 - work[2][lane] * work[208][lane] + (work[13][lane] * t247 - (work[20][lane] * work[230][lane] + work[18][lane]));
+        const double t261 = kowalevski_top_phi2_lane(work[6][lane]);
+        work[231][lane] = work[20][lane] * t261;
+        const double t263 = work[15][lane] * (t247 * work[6][lane] + 2.0 * (work[20][lane] * work[7][lane]) + (work[8][lane] * work[257][lane] - work[0][lane] * work[232][lane] + (work[11][lane] * work[258][lane] - work[13][lane] * work[234][lane]))) + 2.0 * (work[231][lane] * t190);
+        work[159][lane] = t247 * work[14][lane] + 2.0 * (work[235][lane] * work[7][lane]) - t263;
+        const double t265 = coef[1][lane] * work[29][lane];
+        const double t266 = coef[132][lane] + G1 * coef[65][lane];
+        const double t267 = coef[133][lane] * work[29][lane];
+        const double t268 = G2 * (t223 + P3 * (work[47][lane] + (work[49][lane] + work[46][lane]))) + P2 * (G3 * (work[68][lane] + (coef[122][lane] * work[30][lane] + work[69][lane])) + P3 * (work[70][lane] + P1 * (work[71][lane] + (t266 + (t267 + coef[133][lane] * work[30][lane])))));
+        work[238][lane] = work[39][lane] * (coef[130][lane] * work[57][lane] + coef[32][lane] * work[72][lane]) + G2 * (G1 * (work[45][lane] + (t221 + t265)) + (work[40][lane] + G2 * (G2 * coef[9][lane] + t219))) + P3 * t268;
+        work[236][lane] = 0.5 * P3;
+        work[227][lane] = work[13][lane] * work[15][lane];
+        const double t272 = work[73][lane] + (work[74][lane] + work[22][lane]);
+        work[268][lane] = work[51][lane] + work[25][lane];
+        work[261][lane] = work[11][lane] * work[268][lane] + t228;
+        work[224][lane] = work[1][lane] - work[13][lane] * work[268][lane] - t232;
+        work[223][lane] = work[16][lane] - work[75][lane] - work[76][lane];
+        work[262][lane] = work[8][lane] * work[268][lane] + work[2][lane] * work[199][lane] + (work[20][lane] * work[223][lane] + work[11][lane] * t272);
+        const double t278 = G1 * work[2][lane];
+        const double t279 = P1 * work[20][lane];
+        work[222][lane] = t243 + t278 + (t279 + t245);
+        work[225][lane] = work[7][lane] - work[13][lane] * t272 - work[20][lane] * work[222][lane] - (work[2][lane] * work[198][lane] + work[0][lane] * work[268][lane]);
+        work[226][lane] = work[13][lane] * t261;
+        const double t283 = work[15][lane] * (2.0 * work[4][lane] - work[6][lane] * t272 + (work[8][lane] * work[261][lane] - work[0][lane] * work[224][lane] + (work[11][lane] * work[262][lane] - (work[233][lane] + work[13][lane] * work[225][lane])))) + 2.0 * (work[226][lane] * t190);
+        work[161][lane] = work[236][lane] + (2.0 * (work[227][lane] * work[7][lane]) - work[14][lane] * t272 - t283);
+        const double t285 = coef[39][lane] * work[30][lane];
+        const double t286 = G1 * coef[53][lane];
+        const double t287 = coef[12][lane] + t286;
+        const double t288 = coef[35][lane] * work[29][lane];
+        work[158][lane] = P1 * (coef[22][lane] * work[57][lane] + coef[23][lane] * work[77][lane]) + P2 * (coef[32][lane] * work[60][lane] + G2 * (work[78][lane] + t222)) + P3 * (G3 * (work[79][lane] + (work[80][lane] + t285)) + P3 * (work[81][lane] + P1 * (work[46][lane] + (t287 + (t288 + work[82][lane])))));
+        work[266][lane] = t250 * work[14][lane];
+        work[267][lane] = t250 * work[6][lane];
+        work[209][lane] = work[34][lane] - work[63][lane] - work[63][lane];
+        work[252][lane] = work[17][lane] + (work[20][lane] * work[209][lane] - t251);
+        work[210][lane] = work[83][lane] - work[84][lane] + (t253 - t255);
+        work[163][lane] = work[266][lane] - work[15][lane] * (work[267][lane] + (work[11][lane] * work[252][lane] - work[13][lane] * work[210][lane]));
+        const double t296 = coef[138][lane] * work[27][lane];
+        const double t297 = work[85][lane] + t296;
+        const double t298 = coef[137][lane] * work[27][lane];
+        const double t299 = work[29][lane] * (t266 + t297) + (work[27][lane] * (t298 + (coef[49][lane] + G1 * coef[84][lane])) + (G1 * (coef[49][lane] + t286) + (coef[135][lane] * work[57][lane] + (coef[134][lane] + coef[136][lane] * work[77][lane]))));
+        const double t300 = t267 + coef[45][lane] * work[30][lane];
+        work[237][lane] = work[86][lane] + P3 * (work[87][lane] + P1 * (t299 + P1 * (t237 + coef[139][lane] * work[26][lane] + P1 * (t296 + (coef[132][lane] + work[88][lane] + t300)))));
+        const double t302 = work[21][lane] - work[89][lane] - work[90][lane];
+        work[221][lane] = work[11][lane] * work[15][lane];
+        work[219][lane] = work[11][lane] * t261;
+        work[253][lane] = t211 - (work[1][lane] + t212);
+        work[212][lane] = work[38][lane] + work[23][lane];
+        work[216][lane] = t214 + work[20][lane] * work[212][lane];
+        work[214][lane] = t278 + t244 + (t279 + t246);
+        work[254][lane] = work[2][lane] * work[203][lane] - work[8][lane] * t205 + (work[20][lane] * work[214][lane] - (work[11][lane] * t302 + work[7][lane]));
+        work[213][lane] = work[91][lane] + (work[92][lane] + work[16][lane]);
+        work[217][lane] = work[0][lane] * t205 + work[2][lane] * work[212][lane] + (work[20][lane] * work[213][lane] + work[13][lane] * t302);
+        const double t312 = 2.0 * (work[219][lane] * t190) + work[15][lane] * (work[6][lane] * t302 + 2.0 * work[93][lane] + (work[8][lane] * work[253][lane] - work[0][lane] * work[216][lane] + (work[12][lane] + work[11][lane] * work[254][lane] - work[13][lane] * work[217][lane])));
+        work[259][lane] = 0.5 * P2;
+        work[165][lane] = work[14][lane] * t302 + 2.0 * (work[221][lane] * work[7][lane]) - t312 - work[259][lane];
+        work[152][lane] = work[94][lane] + work[95][lane];
+        work[153][lane] = work[20][lane] * work[13][lane];
+        work[166][lane] = work[20][lane] * work[153][lane] + work[13][lane] * work[152][lane];
+        work[151][lane] = work[11][lane] * work[20][lane];
+        work[167][lane] = work[20][lane] * work[151][lane] + work[11][lane] * work[152][lane];
+        work[269][lane] = work[152][lane] * work[14][lane] + work[15][lane] * (work[13][lane] * work[166][lane] + work[11][lane] * work[167][lane] - work[152][lane] * work[6][lane]);
+        work[196][lane] = work[153][lane] * work[14][lane];
+        work[197][lane] = work[153][lane] * work[6][lane];
+        work[168][lane] = work[11][lane] * work[13][lane];
+        const double t324 = work[20][lane] * work[168][lane];
+        work[193][lane] = work[11][lane] * work[153][lane];
+        work[180][lane] = t324 - work[193][lane];
+        work[169][lane] = work[96][lane] + work[95][lane];
+        work[181][lane] = work[13][lane] * work[153][lane] + work[20][lane] * work[169][lane];
+        work[195][lane] = 0.5 * work[11][lane];
+        work[270][lane] = work[196][lane] - work[15][lane] * (work[197][lane] + (work[11][lane] * work[180][lane] - work[13][lane] * work[181][lane])) - work[195][lane];
+        work[170][lane] = coef[118][lane] * work[43][lane];
+        const double t332 = coef[64][lane] * work[30][lane];
+        const double t333 = G1 * coef[41][lane];
+        work[189][lane] = G2 * (work[170][lane] + P3 * (work[97][lane] + (t332 + work[98][lane]))) + P2 * (G3 * (coef[153][lane] + t333 + (work[99][lane] + coef[130][lane] * work[30][lane])) + P3 * (work[100][lane] + coef[147][lane] * work[26][lane] + P1 * (coef[62][lane] * work[27][lane] + work[101][lane])));
+        const double t335 = coef[36][lane] * work[29][lane];
+        work[178][lane] = work[102][lane] + P2 * (coef[57][lane] * work[103][lane] + G2 * (coef[49][lane] + G1 * coef[152][lane] + (coef[148][lane] * work[27][lane] + work[104][lane]))) + P1 * (t220 + G1 * (work[45][lane] + (work[105][lane] + t265)) + P3 * (work[106][lane] + P3 * (work[46][lane] + (work[47][lane] + (work[82][lane] + t335)))));
+        const double t337 = G1 * (work[107][lane] + G2 * (work[108][lane] + coef[146][lane] * work[39][lane]) + G1 * (work[109][lane] + (work[99][lane] + work[110][lane]))) + (work[77][lane] * (work[48][lane] + work[111][lane]) + (coef[19][lane] + work[57][lane] * (t335 + work[112][lane])));
+        const double t338 = work[29][lane] * (coef[125][lane] + G1 * coef[145][lane] + (coef[129][lane] * work[29][lane] + t239)) + work[113][lane] + P1 * (work[114][lane] + t237 + P1 * (work[115][lane] + (work[116][lane] + (t240 + work[117][lane]))));
+        work[240][lane] = t337 + P3 * (G3 * (coef[144][lane] * work[54][lane] + P1 * (work[68][lane] + (t235 + work[118][lane]))) + P3 * t338);
+        const double t340 = coef[47][lane] * work[26][lane];
+        const double t341 = coef[13][lane] * work[27][lane];
+        const double t342 = G1 * coef[149][lane];
+        const double t343 = coef[5][lane] + t342;
+        const double t344 = coef[50][lane] * work[29][lane];
+        const double t345 = work[119][lane] + G1 * (coef[49][lane] + work[120][lane] + (coef[151][lane] * work[29][lane] + work[121][lane])) + P3 * (coef[61][lane] * work[43][lane] + P3 * (coef[56][lane] * work[27][lane] + (t343 + (t344 + coef[35][lane] * work[30][lane]))));
+        work[160][lane] = G2 * (t340 + P1 * (work[78][lane] + (work[105][lane] + t341))) + P2 * t345;
+        const double t347 = coef[74][lane] * work[27][lane];
+        const double t348 = work[29][lane] * (coef[132][lane] + t333 + t297) + (work[27][lane] * (t298 + (coef[49][lane] + G1 * coef[150][lane])) + (G1 * (coef[3][lane] + t342) + (coef[147][lane] * work[57][lane] + (coef[134][lane] + coef[148][lane] * work[77][lane]))));
+        work[241][lane] = G2 * (G3 * (t347 + work[97][lane]) + P1 * (work[106][lane] + P3 * (work[122][lane] + (work[123][lane] + t285)))) + P2 * (work[124][lane] + P3 * (t348 + P1 * (t238 + P1 * (t296 + (t266 + t300)))));
+        work[245][lane] = 0.5 * work[13][lane];
+        work[243][lane] = work[151][lane] * work[14][lane];
+        work[244][lane] = work[151][lane] * work[6][lane];
+        work[194][lane] = work[13][lane] * work[151][lane];
+        work[191][lane] = work[194][lane] - t324;
+        work[192][lane] = work[11][lane] * work[151][lane] + work[20][lane] * work[125][lane];
+        work[271][lane] = work[245][lane] + (work[243][lane] - work[15][lane] * (work[244][lane] - (work[13][lane] * work[191][lane] + work[11][lane] * work[192][lane])));
+        const double t357 = coef[155][lane] * work[27][lane];
+        work[171][lane] = work[97][lane] + (work[126][lane] + t332);
+        work[177][lane] = G2 * (coef[113][lane] * work[43][lane] + P3 * (coef[164][lane] + G1 * coef[109][lane] + (t357 + coef[136][lane] * work[30][lane]))) + P2 * (G3 * work[171][lane] + P3 * (coef[74][lane] * work[26][lane] + coef[148][lane] * work[54][lane] + P1 * (work[123][lane] + (work[122][lane] + (work[99][lane] + t285)))));
+        work[188][lane] = work[26][lane] * (coef[52][lane] * work[27][lane] + (coef[153][lane] + G1 * coef[165][lane])) + P2 * (coef[147][lane] * work[103][lane] + G2 * (work[97][lane] + (t347 + work[126][lane]))) + P1 * (work[29][lane] * (work[127][lane] + (work[128][lane] + t203)) + (work[27][lane] * work[129][lane] + work[130][lane]) + P1 * (work[131][lane] + t202 + P1 * (t203 + work[132][lane])));
+        const double t361 = G1 * coef[162][lane];
+        const double t362 = work[29][lane] * (t343 + (coef[75][lane] * work[27][lane] + coef[79][lane] * work[29][lane])) + (work[133][lane] + G1 * (coef[67][lane] + t361 + coef[163][lane] * work[27][lane])) + P1 * (work[131][lane] + coef[82][lane] * work[26][lane] + P1 * (coef[85][lane] * work[27][lane] + (t287 + (t288 + coef[87][lane] * work[30][lane]))));
+        work[164][lane] = work[134][lane] + P3 * t362;
+        const double t364 = coef[158][lane] * work[27][lane];
+        const double t365 = work[27][lane] * (coef[154][lane] * work[77][lane] + coef[97][lane] * work[57][lane]) + work[135][lane] + G1 * (work[133][lane] + G1 * (t357 + work[136][lane])) + P2 * (coef[156][lane] * work[137][lane] + P2 * (work[29][lane] * (work[138][lane] + (t239 + work[139][lane])) + (work[27][lane] * (coef[34][lane] + G1 * coef[157][lane] + t364) + work[140][lane])));
+        const double t366 = work[29][lane] * (work[116][lane] + (coef[124][lane] * work[27][lane] + work[141][lane])) + (work[27][lane] * (coef[34][lane] + G1 * coef[161][lane] + t364) + work[142][lane]) + P1 * (t236 + work[143][lane] + P1 * (t239 + work[144][lane]));
+        const double t367 = work[26][lane] * (coef[88][lane] + G1 * coef[159][lane] + coef[92][lane] * work[27][lane]) + P2 * (coef[121][lane] * work[103][lane] + G2 * (work[122][lane] + (work[99][lane] + coef[160][lane] * work[27][lane]))) + P1 * t366;
+        work[242][lane] = t365 + P1 * t367;
+        work[154][lane] = G2 * (coef[110][lane] + G1 * coef[166][lane] + (coef[23][lane] * work[30][lane] + coef[69][lane] * work[27][lane])) + P2 * (coef[51][lane] * work[54][lane] + t340 + P1 * (t341 + (work[78][lane] + work[145][lane])));
+        work[156][lane] = G3 * (coef[38][lane] + G1 * coef[167][lane] + (coef[22][lane] * work[30][lane] + t344)) + P3 * (coef[68][lane] * work[26][lane] + work[146][lane] + P1 * (coef[6][lane] * work[27][lane] + work[147][lane]));
+        work[162][lane] = P2 * (coef[102][lane] * work[148][lane] + P2 * (coef[55][lane] * work[27][lane] + (coef[12][lane] + work[120][lane] + work[149][lane]))) + (coef[90][lane] * work[57][lane] + coef[91][lane] * work[77][lane] + P3 * (coef[101][lane] * work[43][lane] + P3 * (coef[21][lane] + t361 + (work[150][lane] + coef[27][lane] * work[30][lane]))));
+        displacement[0][lane] = work[14][lane] * work[7][lane] - work[15][lane] * t190 - 0.5 * work[16][lane];
+        displacement[1][lane] = work[14][lane] * work[18][lane] - work[15][lane] * work[220][lane] - 0.5 * work[21][lane];
+        displacement[2][lane] = work[14][lane] * work[19][lane] - work[15][lane] * work[255][lane] - 0.5 * work[22][lane];
+        displacement[3][lane] = work[1][lane] * work[14][lane] - work[15][lane] * work[264][lane] - 0.5 * work[23][lane];
+        displacement[4][lane] = work[14][lane] * work[3][lane] - work[15][lane] * work[272][lane] - 0.5 * work[24][lane];
+        displacement[5][lane] = work[14][lane] * work[17][lane] - work[15][lane] * work[273][lane] - 0.5 * work[25][lane];
+        increment_jacobian[30][lane] = G1 * work[238][lane] - G2 * work[239][lane];
+        increment_jacobian[24][lane] = G3 * work[239][lane] - G1 * work[237][lane];
+        jacobian[0][lane] = 1.0 + (work[190][lane] * work[157][lane] + work[179][lane] * work[155][lane] + (work[239][lane] * work[159][lane] + work[238][lane] * work[161][lane] + (work[158][lane] * work[163][lane] + work[237][lane] * work[165][lane])) - work[269][lane]);
+        increment_jacobian[31][lane] = G1 * work[240][lane] - G2 * work[238][lane];
+        jacobian[1][lane] = work[270][lane] + (work[189][lane] * work[157][lane] + work[178][lane] * work[155][lane] + (work[238][lane] * work[159][lane] + work[240][lane] * work[161][lane] + (work[160][lane] * work[163][lane] + work[241][lane] * work[165][lane])));
+        increment_jacobian[19][lane] = G2 * work[241][lane] - G3 * work[240][lane];
+        jacobian[2][lane] = work[271][lane] + (work[177][lane] * work[155][lane] + work[188][lane] * work[157][lane] + (work[237][lane] * work[159][lane] + work[241][lane] * work[161][lane] + (work[164][lane] * work[163][lane] + work[242][lane] * work[165][lane])));
+        increment_jacobian[20][lane] = G2 * work[242][lane] - G3 * work[241][lane];
+        increment_jacobian[26][lane] = G3 * work[237][lane] - G1 * work[242][lane];
+        increment_jacobian[9][lane] = P3 * work[158][lane] + (G3 * work[162][lane] - P1 * work[164][lane]) - G1 * work[156][lane] - work[8][lane];
+        increment_jacobian[15][lane] = work[0][lane] + (G1 * work[154][lane] + (P1 * work[160][lane] - P2 * work[158][lane] - G2 * work[162][lane]));
+    }
+}
+
+/* kowalevski_top_linearise_lanes_part3 (part 3 of 3) */
+kowalevski_top_APART static void kowalevski_top_linearise_lanes_part3(kowalevski_top_lanes coef[restrict 172],
+                                                                      kowalevski_top_lanes y[restrict 6],
+                                                                      kowalevski_top_lanes displacement[restrict 6],
+                                                                      kowalevski_top_lanes increment[restrict 6],
+                                                                      kowalevski_top_lanes jacobian[restrict 36],
+                                                                      kowalevski_top_lanes increment_jacobian[restrict 36],
+                                                                      kowalevski_top_lanes work[restrict 274])
+{
+    (void)displacement;
+    (void)increment;
+    kowalevski_top_EACH_LANE
+    for (int lane = 0; lane < kowalevski_top_LANES; ++lane) {
+        const double P1 = y[0][lane];
+        const double P2 = y[1][lane];
+        const double P3 = y[2][lane];
+        const double G1 = y[3][lane];
+        const double G2 = y[4][lane];
+        const double G3 = y[5][lane];
+        const double t372 = work[8][lane] * work[11][lane];
+        const double t373 = work[0][lane] * work[13][lane];
+        const double t374 = t372 + t373;
+        const double t375 = t374 + t374;
+        const double t376 = work[8][lane] * work[20][lane] + work[2][lane] * work[11][lane];
+        const double t377 = work[2][lane] * work[151][lane] + work[8][lane] * work[152][lane] + (work[20][lane] * t376 + work[11][lane] * t375);
+        const double t378 = work[0][lane] * work[20][lane] + work[2][lane] * work[13][lane];
+        const double t379 = work[2][lane] * work[153][lane] + work[0][lane] * work[152][lane] + (work[20][lane] * t378 + work[13][lane] * t375);
+        const double t380 = work[154][lane] * work[155][lane] + work[156][lane] * work[157][lane] + (work[158][lane] * work[159][lane] + work[160][lane] * work[161][lane] + (work[162][lane] * work[163][lane] + work[164][lane] * work[165][lane])) - (t375 * work[14][lane] + work[15][lane] * (work[0][lane] * work[166][lane] + work[8][lane] * work[167][lane] + (work[11][lane] * t377 + work[13][lane] * t379) - t375 * work[6][lane]));
+        const double t381 = t378 * work[14][lane];
+        const double t382 = t378 * work[6][lane];
+        const double t383 = work[2][lane] * work[168][lane];
+        const double t384 = work[8][lane] * work[153][lane];
+        const double t385 = work[8][lane] * work[13][lane] + work[0][lane] * work[11][lane];
+        const double t386 = work[20][lane] * t385;
+        const double t387 = work[11][lane] * t378;
+        const double t388 = t383 - t384 + (t386 - t387);
+        const double t389 = work[2][lane] * work[20][lane];
+        const double t390 = t389 + t372;
+        const double t391 = t390 + t390;
+        const double t392 = work[0][lane] * work[153][lane] + work[2][lane] * work[169][lane] + (work[13][lane] * t378 + work[20][lane] * t391);
+        const double t393 = 0.5 * work[8][lane];
+        const double t394 = G2 * (G3 * coef[169][lane] + coef[113][lane] * (P1 * P3)) + P2 * (work[170][lane] + P3 * (work[98][lane] + work[171][lane]));
+        const double t395 = work[29][lane] * work[172][lane] + (work[173][lane] + (work[174][lane] + (work[175][lane] + (coef[107][lane] + coef[168][lane] * work[77][lane])))) + P1 * (coef[167][lane] * work[54][lane] + work[44][lane] + P1 * (work[176][lane] + (work[61][lane] + (work[49][lane] + work[62][lane]))));
+        const double t396 = t381 - work[15][lane] * (t382 + (work[8][lane] * work[180][lane] - work[0][lane] * work[181][lane] + (work[11][lane] * t388 - work[13][lane] * t392))) - t393 + (t394 * work[157][lane] + t395 * work[155][lane] + (work[179][lane] * work[159][lane] + work[178][lane] * work[161][lane] + (work[154][lane] * work[163][lane] + work[177][lane] * work[165][lane])));
+        const double t397 = 0.5 * work[0][lane];
+        const double t398 = t376 * work[14][lane];
+        const double t399 = t376 * work[6][lane];
+        const double t400 = work[0][lane] * work[151][lane];
+        const double t401 = work[13][lane] * t376;
+        const double t402 = t400 - t383 + (t401 - t386);
+        const double t403 = t389 + t373;
+        const double t404 = t403 + t403;
+        const double t405 = work[8][lane] * work[151][lane] + work[2][lane] * work[125][lane] + (work[11][lane] * t376 + work[20][lane] * t404);
+        const double t406 = work[29][lane] * (work[182][lane] + (coef[53][lane] * work[27][lane] + work[183][lane])) + (work[27][lane] * work[184][lane] + (work[185][lane] + (coef[170][lane] * work[57][lane] + work[186][lane]))) + P1 * (coef[171][lane] * work[26][lane] + work[28][lane] + P1 * (coef[25][lane] * work[27][lane] + work[187][lane]));
+        const double t407 = t397 + (t398 - work[15][lane] * (t399 - (work[0][lane] * work[191][lane] + work[8][lane] * work[192][lane] + (work[13][lane] * t402 + work[11][lane] * t405)))) + (t406 * work[157][lane] + t394 * work[155][lane] + (work[190][lane] * work[159][lane] + work[189][lane] * work[161][lane] + (work[156][lane] * work[163][lane] + work[188][lane] * work[165][lane])));
+        const double t408 = work[193][lane] - work[194][lane];
+        const double t409 = work[195][lane] + (work[196][lane] - work[15][lane] * (work[197][lane] - (work[11][lane] * t408 + work[20][lane] * work[166][lane])));
+        const double t410 = work[198][lane] * work[14][lane];
+        const double t411 = work[198][lane] * work[6][lane];
+        const double t412 = work[11][lane] * work[198][lane];
+        const double t413 = work[13][lane] * work[199][lane];
+        const double t414 = work[200][lane] - work[201][lane] + (t412 - t413);
+        const double t415 = t410 - work[15][lane] * (t411 + (work[20][lane] * work[202][lane] - work[11][lane] * t414));
+        const double t416 = 0.5 * G1;
+        const double t417 = work[13][lane] * work[203][lane];
+        const double t418 = work[3][lane] + (work[11][lane] * work[204][lane] - t417);
+        const double t419 = t416 + (work[204][lane] * work[14][lane] - work[15][lane] * (work[204][lane] * work[6][lane] + (work[205][lane] - work[206][lane] + (work[20][lane] * work[207][lane] - work[11][lane] * t418))));
+        const double t420 = work[208][lane] * work[14][lane];
+        const double t421 = work[208][lane] * work[6][lane];
+        const double t422 = work[11][lane] * work[208][lane];
+        const double t423 = t422 - work[13][lane] * work[209][lane];
+        const double t424 = t420 - work[15][lane] * (t421 + (work[10][lane] + (work[20][lane] * work[210][lane] - work[11][lane] * t423))) - work[211][lane];
+        const double t425 = 0.5 * P1;
+        const double t426 = work[3][lane] - work[11][lane] * work[212][lane] - t417;
+        const double t427 = work[18][lane] - work[11][lane] * work[213][lane] - work[13][lane] * work[214][lane] - (work[0][lane] * work[203][lane] + work[8][lane] * work[212][lane]);
+        const double t428 = work[15][lane] * (2.0 * work[215][lane] - work[6][lane] * work[213][lane] + (work[2][lane] * work[216][lane] - work[8][lane] * t426 + (work[20][lane] * work[217][lane] - (work[218][lane] + work[11][lane] * t427)))) + 2.0 * (work[219][lane] * work[220][lane]);
+        const double t429 = t425 + (2.0 * (work[221][lane] * work[18][lane]) - work[14][lane] * work[213][lane] - t428);
+        const double t430 = t412 - (t413 + work[17][lane]);
+        const double t431 = work[8][lane] * work[198][lane] - work[0][lane] * work[199][lane] + (work[11][lane] * work[222][lane] - (work[13][lane] * work[223][lane] + work[19][lane]));
+        const double t432 = work[15][lane] * (work[222][lane] * work[6][lane] + 2.0 * (work[13][lane] * work[18][lane]) + (work[2][lane] * work[224][lane] - work[8][lane] * t430 + (work[20][lane] * work[225][lane] - work[11][lane] * t431))) + 2.0 * (work[226][lane] * work[220][lane]);
+        const double t433 = work[222][lane] * work[14][lane] + 2.0 * (work[227][lane] * work[18][lane]) - t432;
+        const double t434 = work[13][lane] * work[228][lane] + t422;
+        const double t435 = work[8][lane] * work[208][lane] + work[0][lane] * work[228][lane] + (work[13][lane] * work[229][lane] + work[11][lane] * work[230][lane]);
+        const double t436 = 2.0 * (work[231][lane] * work[220][lane]) + work[15][lane] * (work[6][lane] * work[230][lane] + 2.0 * work[5][lane] + (work[2][lane] * work[232][lane] - work[8][lane] * t434 + (work[233][lane] + work[20][lane] * work[234][lane] - work[11][lane] * t435)));
+        const double t437 = work[14][lane] * work[230][lane] + 2.0 * (work[235][lane] * work[18][lane]) - t436 - work[236][lane];
+        const double t438 = work[13][lane] * work[168][lane] + work[11][lane] * work[169][lane];
+        const double t439 = work[169][lane] * work[14][lane] + work[15][lane] * (work[11][lane] * t438 + work[20][lane] * work[181][lane] - work[169][lane] * work[6][lane]);
+        const double t440 = work[168][lane] * work[14][lane];
+        const double t441 = work[168][lane] * work[6][lane];
+        const double t442 = work[11][lane] * work[168][lane] + work[13][lane] * work[125][lane];
+        const double t443 = 0.5 * work[20][lane];
+        const double t444 = t440 - work[15][lane] * (t441 + (work[20][lane] * work[191][lane] - work[11][lane] * t442)) - t443;
+        const double t445 = t384 - t400 + (t387 - t401);
+        const double t446 = t393 + (t381 - work[15][lane] * (t382 - (work[8][lane] * t408 + work[2][lane] * work[166][lane] + (work[11][lane] * t445 + work[20][lane] * t379)))) + (work[154][lane] * t415 + work[156][lane] * t419 + (work[160][lane] * t433 + work[158][lane] * t437 + (work[162][lane] * t424 + work[164][lane] * t429)));
+        const double t447 = work[0][lane] * work[168][lane] + work[8][lane] * work[169][lane] + (work[13][lane] * t385 + work[11][lane] * t391);
+        const double t448 = t395 * t415 + t394 * t419 + (work[154][lane] * t424 + work[177][lane] * t429 + (work[178][lane] * t433 + work[179][lane] * t437)) - (t391 * work[14][lane] + work[15][lane] * (work[8][lane] * t438 + work[2][lane] * work[181][lane] + (work[20][lane] * t392 + work[11][lane] * t447) - t391 * work[6][lane]));
+        const double t449 = t385 * work[14][lane];
+        const double t450 = t385 * work[6][lane];
+        const double t451 = work[8][lane] * work[168][lane] + work[0][lane] * work[125][lane] + (work[11][lane] * t385 + work[13][lane] * t404);
+        const double t452 = 0.5 * work[2][lane];
+        const double t453 = t449 - work[15][lane] * (t450 + (work[2][lane] * work[191][lane] - work[8][lane] * t442 + (work[20][lane] * t402 - work[11][lane] * t451))) - t452 + (t394 * t415 + t406 * t419 + (work[156][lane] * t424 + work[188][lane] * t429 + (work[189][lane] * t433 + work[190][lane] * t437)));
+        const double t454 = work[243][lane] - work[15][lane] * (work[244][lane] + (work[13][lane] * t408 - work[20][lane] * work[167][lane])) - work[245][lane];
+        const double t455 = work[203][lane] * work[14][lane];
+        const double t456 = work[203][lane] * work[6][lane];
+        const double t457 = t455 - work[15][lane] * (t456 + (work[13][lane] * t418 - work[20][lane] * work[246][lane]));
+        const double t458 = work[199][lane] * work[14][lane];
+        const double t459 = work[6][lane] * work[199][lane];
+        const double t460 = t458 - work[15][lane] * (t459 + (work[247][lane] + (work[13][lane] * t414 - work[20][lane] * work[248][lane]))) - t416;
+        const double t461 = work[249][lane] + (work[209][lane] * work[14][lane] - work[15][lane] * (work[6][lane] * work[209][lane] + (work[250][lane] - work[251][lane] + (work[13][lane] * t423 - work[20][lane] * work[252][lane]))));
+        const double t462 = work[15][lane] * (work[6][lane] * work[214][lane] + 2.0 * (work[11][lane] * work[19][lane]) + (work[0][lane] * t426 - work[2][lane] * work[253][lane] + (work[13][lane] * t427 - work[20][lane] * work[254][lane]))) + 2.0 * (work[219][lane] * work[255][lane]);
+        const double t463 = work[214][lane] * work[14][lane] + 2.0 * (work[221][lane] * work[19][lane]) - t462;
+        const double t464 = work[15][lane] * (2.0 * work[256][lane] - work[6][lane] * work[229][lane] + (work[0][lane] * t434 - work[2][lane] * work[257][lane] + (work[13][lane] * t435 - (work[12][lane] + work[20][lane] * work[258][lane])))) + 2.0 * (work[231][lane] * work[255][lane]);
+        const double t465 = work[259][lane] + (2.0 * (work[235][lane] * work[19][lane]) - work[14][lane] * work[229][lane] - t464);
+        const double t466 = work[15][lane] * (work[6][lane] * work[223][lane] + 2.0 * work[260][lane] + (work[0][lane] * t430 - work[2][lane] * work[261][lane] + (work[218][lane] + work[13][lane] * t431 - work[20][lane] * work[262][lane]))) + 2.0 * (work[226][lane] * work[255][lane]);
+        const double t467 = work[14][lane] * work[223][lane] + 2.0 * (work[227][lane] * work[19][lane]) - t466 - t425;
+        const double t468 = t443 + (t440 - work[15][lane] * (t441 - (work[20][lane] * work[180][lane] + work[13][lane] * t438)));
+        const double t469 = work[125][lane] * work[14][lane] + work[15][lane] * (work[13][lane] * t442 + work[20][lane] * work[192][lane] - work[125][lane] * work[6][lane]);
+        const double t470 = t398 - work[15][lane] * (t399 + (work[0][lane] * t408 - work[2][lane] * work[167][lane] + (work[13][lane] * t445 - work[20][lane] * t377))) - t397 + (work[156][lane] * t457 + work[154][lane] * t460 + (work[162][lane] * t461 + work[164][lane] * t463 + (work[160][lane] * t467 + work[158][lane] * t465)));
+        const double t471 = t452 + (t449 - work[15][lane] * (t450 - (work[2][lane] * work[180][lane] + work[0][lane] * t438 + (work[20][lane] * t388 + work[13][lane] * t447)))) + (t394 * t457 + t395 * t460 + (work[154][lane] * t461 + work[177][lane] * t463 + (work[179][lane] * t465 + work[178][lane] * t467)));
+        const double t472 = t406 * t457 + t394 * t460 + (work[156][lane] * t461 + work[188][lane] * t463 + (work[189][lane] * t467 + work[190][lane] * t465)) - (t404 * work[14][lane] + work[15][lane] * (work[0][lane] * t442 + work[2][lane] * work[192][lane] + (work[13][lane] * t451 + work[20][lane] * t405) - t404 * work[6][lane]));
+        const double t473 = work[263][lane] + 2.0 * (work[1][lane] * work[221][lane]) - (2.0 * (work[219][lane] * work[264][lane]) + work[15][lane] * (work[265][lane] + 2.0 * work[250][lane] + (work[9][lane] + work[11][lane] * work[253][lane] - work[13][lane] * work[216][lane])));
+        const double t474 = t473 - work[249][lane];
+        const double t475 = work[266][lane] + 2.0 * (work[1][lane] * work[235][lane]) - (work[15][lane] * (work[267][lane] + 2.0 * (work[20][lane] * work[1][lane]) + (work[11][lane] * work[257][lane] - work[13][lane] * work[232][lane])) + 2.0 * (work[231][lane] * work[264][lane]));
+        const double t476 = 2.0 * (work[1][lane] * work[227][lane]) - work[268][lane] * work[14][lane] - (2.0 * (work[226][lane] * work[264][lane]) + work[15][lane] * (2.0 * work[53][lane] - work[268][lane] * work[6][lane] + (work[11][lane] * work[261][lane] - (work[10][lane] + work[13][lane] * work[224][lane]))));
+        const double t477 = work[211][lane] + t476;
+        const double t478 = 2.0 * (work[3][lane] * work[221][lane]) - work[212][lane] * work[14][lane] - (work[15][lane] * (2.0 * work[206][lane] - work[212][lane] * work[6][lane] + (work[20][lane] * work[216][lane] - (work[247][lane] + work[11][lane] * t426))) + 2.0 * (work[219][lane] * work[272][lane]));
+        const double t479 = t416 + t478;
+        const double t480 = t410 + 2.0 * (work[3][lane] * work[227][lane]) - (work[15][lane] * (t411 + 2.0 * (work[13][lane] * work[3][lane]) + (work[20][lane] * work[224][lane] - work[11][lane] * t430)) + 2.0 * (work[226][lane] * work[272][lane]));
+        const double t481 = t420 + 2.0 * (work[3][lane] * work[235][lane]) - (2.0 * (work[231][lane] * work[272][lane]) + work[15][lane] * (t421 + 2.0 * work[52][lane] + (work[10][lane] + work[20][lane] * work[232][lane] - work[11][lane] * t434)));
+        const double t482 = t481 - work[211][lane];
+        const double t483 = t455 + 2.0 * (work[17][lane] * work[221][lane]) - (work[15][lane] * (t456 + 2.0 * (work[11][lane] * work[17][lane]) + (work[13][lane] * t426 - work[20][lane] * work[253][lane])) + 2.0 * (work[219][lane] * work[273][lane]));
+        const double t484 = 2.0 * (work[17][lane] * work[235][lane]) - work[228][lane] * work[14][lane] - (2.0 * (work[231][lane] * work[273][lane]) + work[15][lane] * (2.0 * work[251][lane] - work[228][lane] * work[6][lane] + (work[13][lane] * t434 - (work[9][lane] + work[20][lane] * work[257][lane]))));
+        const double t485 = work[249][lane] + t484;
+        const double t486 = t458 + 2.0 * (work[17][lane] * work[227][lane]) - (work[15][lane] * (t459 + 2.0 * work[205][lane] + (work[247][lane] + work[13][lane] * t430 - work[20][lane] * work[261][lane])) + 2.0 * (work[226][lane] * work[273][lane]));
+        const double t487 = t486 - t416;
+        const double t488 = G2 * work[190][lane];
+        const double t489 = G3 * work[179][lane];
+        const double t490 = P2 * work[237][lane];
+        const double t491 = P3 * work[238][lane];
+        const double t492 = G3 * work[178][lane];
+        const double t493 = G2 * work[188][lane];
+        const double t494 = G2 * work[156][lane];
+        const double t495 = G3 * work[154][lane];
+        const double t496 = G3 * work[158][lane];
+        const double t497 = G3 * work[160][lane];
+        const double t498 = P1 * work[241][lane];
+        const double t499 = G1 * work[189][lane];
+        const double t500 = G1 * work[188][lane];
+        const double t501 = G1 * t394;
+        const double t502 = G2 * work[158][lane];
+        const double t503 = G1 * work[178][lane];
+        const double t504 = G1 * work[177][lane];
+        const double t505 = G2 * work[164][lane];
+        const double t506 = G2 * work[237][lane];
+        const double t507 = G3 * work[238][lane];
+        const double t508 = G1 * work[241][lane];
+        jacobian[3][lane] = t380;
+        increment_jacobian[4][lane] = work[8][lane] + (G2 * t394 - G3 * t395 + (P2 * work[177][lane] - P3 * work[178][lane]));
+        increment_jacobian[16][lane] = G1 * t395 + (P1 * work[178][lane] - P2 * work[179][lane] - G2 * work[154][lane]) - work[2][lane];
+        jacobian[4][lane] = t396;
+        increment_jacobian[5][lane] = G2 * t406 - G3 * t394 + (P2 * work[188][lane] - P3 * work[189][lane]) - work[0][lane];
+        increment_jacobian[11][lane] = work[2][lane] + (P3 * work[190][lane] + (G3 * work[156][lane] - P1 * work[188][lane]) - G1 * t406);
+        jacobian[5][lane] = t407;
+        jacobian[6][lane] = t409 + (work[179][lane] * t415 + work[190][lane] * t419 + (work[158][lane] * t424 + work[237][lane] * t429 + (work[238][lane] * t433 + work[239][lane] * t437)));
+        jacobian[7][lane] = 1.0 + (work[178][lane] * t415 + work[189][lane] * t419 + (work[240][lane] * t433 + work[238][lane] * t437 + (work[160][lane] * t424 + work[241][lane] * t429)) - t439);
+        jacobian[8][lane] = t444 + (work[177][lane] * t415 + work[188][lane] * t419 + (work[241][lane] * t433 + work[237][lane] * t437 + (work[164][lane] * t424 + work[242][lane] * t429)));
+        jacobian[9][lane] = t446;
+        jacobian[10][lane] = t448;
+        jacobian[11][lane] = t453;
+        jacobian[12][lane] = t454 + (work[190][lane] * t457 + work[179][lane] * t460 + (work[158][lane] * t461 + work[237][lane] * t463 + (work[239][lane] * t465 + work[238][lane] * t467)));
+        jacobian[13][lane] = t468 + (work[189][lane] * t457 + work[178][lane] * t460 + (work[160][lane] * t461 + work[241][lane] * t463 + (work[238][lane] * t465 + work[240][lane] * t467)));
+        jacobian[14][lane] = 1.0 + (work[188][lane] * t457 + work[177][lane] * t460 + (work[164][lane] * t461 + work[242][lane] * t463 + (work[241][lane] * t467 + work[237][lane] * t465)) - t469);
+        jacobian[15][lane] = t470;
+        jacobian[16][lane] = t471;
+        jacobian[17][lane] = t472;
+        jacobian[18][lane] = work[237][lane] * t474 + (work[239][lane] * t475 + work[238][lane] * t477);
+        jacobian[19][lane] = work[241][lane] * t474 + (work[238][lane] * t475 + work[240][lane] * t477);
+        jacobian[20][lane] = work[242][lane] * t474 + (work[237][lane] * t475 + work[241][lane] * t477);
+        jacobian[21][lane] = 1.0 + (work[164][lane] * t474 + (work[158][lane] * t475 + work[160][lane] * t477) - work[269][lane]);
+        jacobian[22][lane] = work[270][lane] + (work[177][lane] * t474 + (work[179][lane] * t475 + work[178][lane] * t477));
+        jacobian[23][lane] = work[271][lane] + (work[188][lane] * t474 + (work[190][lane] * t475 + work[189][lane] * t477));
+        jacobian[24][lane] = work[237][lane] * t479 + (work[238][lane] * t480 + work[239][lane] * t482);
+        jacobian[25][lane] = work[241][lane] * t479 + (work[240][lane] * t480 + work[238][lane] * t482);
+        jacobian[26][lane] = work[242][lane] * t479 + (work[241][lane] * t480 + work[237][lane] * t482);
+        jacobian[27][lane] = t409 + (work[164][lane] * t479 + (work[160][lane] * t480 + work[158][lane] * t482));
+        jacobian[28][lane] = 1.0 + (work[177][lane] * t479 + (work[178][lane] * t480 + work[179][lane] * t482) - t439);
+        jacobian[29][lane] = t444 + (work[188][lane] * t479 + (work[189][lane] * t480 + work[190][lane] * t482));
+        jacobian[30][lane] = work[237][lane] * t483 + (work[239][lane] * t485 + work[238][lane] * t487);
+        jacobian[31][lane] = work[241][lane] * t483 + (work[240][lane] * t487 + work[238][lane] * t485);
+        jacobian[32][lane] = work[242][lane] * t483 + (work[241][lane] * t487 + work[237][lane] * t485);
+        jacobian[33][lane] = t454 + (work[164][lane] * t483 + (work[158][lane] * t485 + work[160][lane] * t487));
+        jacobian[34][lane] = t468 + (work[177][lane] * t483 + (work[178][lane] * t487 + work[179][lane] * t485));
+        jacobian[35][lane] = 1.0 + (work[188][lane] * t483 + (work[190][lane] * t485 + work[189][lane] * t487) - t469);
+        increment_jacobian[0][lane] = t488 - t489 + (t490 - t491);
+        increment_jacobian[1][lane] = work[11][lane] + (G2 * work[189][lane] - t492 + (P2 * work[241][lane] - P3 * work[240][lane]));
+        increment_jacobian[22][lane] = G2 * work[177][lane] - t492 + work[11][lane];
+        increment_jacobian[2][lane] = t493 - G3 * work[177][lane] + (P2 * work[242][lane] - P3 * work[241][lane]) - work[13][lane];
+        increment_jacobian[23][lane] = t493 - G3 * work[189][lane] - work[13][lane];
+        increment_jacobian[3][lane] = t494 - t495 + (P2 * work[164][lane] - P3 * work[160][lane]);
+        increment_jacobian[6][lane] = P3 * work[239][lane] + (t496 - P1 * work[237][lane]) - G1 * work[190][lane] - work[11][lane];
+        increment_jacobian[27][lane] = t496 - G1 * work[164][lane] - work[11][lane];
+        increment_jacobian[7][lane] = t491 + (t497 - t498) - t499;
+        increment_jacobian[35][lane] = t499 - t488;
+        increment_jacobian[8][lane] = work[20][lane] + (P3 * work[237][lane] + (G3 * work[164][lane] - P1 * work[242][lane]) - t500);
+        increment_jacobian[29][lane] = G3 * work[190][lane] - t500 + work[20][lane];
+        increment_jacobian[10][lane] = P3 * work[179][lane] + (t495 - P1 * work[177][lane]) - t501;
+        increment_jacobian[17][lane] = t501 + (P1 * work[189][lane] - P2 * work[190][lane] - t494);
+        increment_jacobian[12][lane] = work[13][lane] + (G1 * work[179][lane] + (P1 * work[238][lane] - P2 * work[239][lane] - t502));
+        increment_jacobian[33][lane] = G1 * work[160][lane] - t502 + work[13][lane];
+        increment_jacobian[13][lane] = t503 + (P1 * work[240][lane] - P2 * work[238][lane] - G2 * work[160][lane]) - work[20][lane];
+        increment_jacobian[34][lane] = t503 - G2 * work[179][lane] - work[20][lane];
+        increment_jacobian[28][lane] = t489 - t504;
+        increment_jacobian[14][lane] = t504 + (t498 - t490 - t505);
+        increment_jacobian[21][lane] = t505 - t497;
+        increment_jacobian[18][lane] = t506 - t507;
+        increment_jacobian[25][lane] = t507 - t508;
+        increment_jacobian[32][lane] = t508 - t506;
+    }
+}
+
+/* kowalevski_top_linearise in all lanes. */
+static void kowalevski_top_linearise_lanes(kowalevski_top_lanes coef[restrict 172],
+                                           kowalevski_top_lanes y[restrict 6],
+                                           kowalevski_top_lanes displacement[restrict 6],
+                                           kowalevski_top_lanes increment[restrict 6],
+                                           kowalevski_top_lanes jacobian[restrict 36],
+                                           kowalevski_top_lanes increment_jacobian[restrict 36])
+{
+    kowalevski_top_lanes work[274];
+    kowalevski_top_linearise_lanes_part1(coef, y, displacement, increment, jacobian, increment_jacobian, work);
+    kowalevski_top_linearise_lanes_part2(coef, y, displacement, increment, jacobian, increment_jacobian, work);
+    kowalevski_top_linearise_lanes_part3(coef, y, displacement, increment, jacobian, increment_jacobian, work);
+}
+
+/* Invert the matrices of all lanes in place by elimination without pivoting: they are I + O(h). Infinite where a pivot is
+   far from 1. */
+static void kowalevski_top_invert(kowalevski_top_lanes matrix[restrict 36])
+{
+    for (int k = 0; k < 6; ++k) {
+        kowalevski_top_lanes factor[6];
+        kowalevski_top_EACH_LANE
+        for (int lane = 0; lane < kowalevski_top_LANES; ++lane) {
+            const double reciprocal = 1.0 / matrix[k * 6 + k][lane];
+            matrix[k * 6 + k][lane] = 1.0;
+            for (int j = 0; j < 6; ++j) matrix[k * 6 + j][lane] *= reciprocal;
+            matrix[k * 6 + k][lane] += fabs(reciprocal) < 1e3 ? 0.0 : HUGE_VAL;
+        }
+        for (int i = 0; i < 6; ++i) {
+            kowalevski_top_EACH_LANE
+            for (int lane = 0; lane < kowalevski_top_LANES; ++lane) {
+                factor[i][lane] = matrix[i * 6 + k][lane];
+                if (i != k) matrix[i * 6 + k][lane] = 0.0;
+            }
+        }
+        for (int i = 0; i < 6; ++i)
+            for (int j = 0; j < 6 && i != k; ++j) {
+                kowalevski_top_EACH_LANE
+                for (int lane = 0; lane < kowalevski_top_LANES; ++lane)
+                    matrix[i * 6 + j][lane] -= factor[i][lane] * matrix[k * 6 + j][lane];
+            }
+    }
+}
+
+/* Everything about a stage at the points y. */
+static void kowalevski_top_tabulate(kowalevski_top_lanes coef[restrict], kowalevski_top_lines *line)
+{
+    kowalevski_top_linearise_lanes(coef, line->y, line->displacement, line->increment, line->inverse, line->slope);
+    kowalevski_top_invert(line->inverse);
+    for (int i = 0; i < 6; ++i)
+        for (int j = 0; j < 6; ++j) {
+            kowalevski_top_lanes sum = { 0.0 };
+            for (int k = 0; k < 6; ++k) {
+                kowalevski_top_EACH_LANE
+                for (int lane = 0; lane < kowalevski_top_LANES; ++lane)
+                    sum[lane] += line->slope[i * 6 + k][lane] * line->inverse[k * 6 + j][lane];
+            }
+            memcpy(line->gain[i * 6 + j], sum, sizeof sum);
+        }
+}
+
+/* kowalevski_top_size in all lanes, summed over the components. */
+static void kowalevski_top_sizes(kowalevski_top_lanes y[restrict 6], kowalevski_top_lanes delta[restrict 6],
+    kowalevski_top_lanes size)
+{
+    kowalevski_top_lanes norm = { 0.0 };
+    memset(size, 0, kowalevski_top_LANES * sizeof size[0]);
+    for (int i = 0; i < 6; ++i)
+        for (int lane = 0; lane < kowalevski_top_LANES; ++lane)
+            norm[lane] = 1e-6 * fabs(y[i][lane]) > norm[lane] ? 1e-6 * fabs(y[i][lane]) : norm[lane];
+    for (int i = 0; i < 6; ++i) {
+        kowalevski_top_EACH_LANE
+        for (int lane = 0; lane < kowalevski_top_LANES; ++lane)
+            size[lane] += fabs(delta[i][lane]) / (fabs(y[i][lane]) + norm[lane] + DBL_MIN);
+    }
+}
+
+/* The steps of a block one after the other, each along the lines of its lane. As X, the state with its carry, gains
+   increment - gain residual, the next residual follows from this one; X itself is added up apart. */
+static void kowalevski_top_chain(kowalevski_top_lines line[1], double x[6], double carry[6])
+{
+    double residual[6], sum[6], small[6];
+    for (int i = 0; i < 6; ++i) {
+        residual[i] = ((line->y[i][0] - x[i]) + line->displacement[i][0]) - carry[i];
+        sum[i] = x[i];
+        small[i] = carry[i];
+    }
+    for (int k = 0; k < 1 * kowalevski_top_LANES; ++k) {
+        const int lane = k / 1, after = (k + 1) / 1 % kowalevski_top_LANES;
+        kowalevski_top_lines *at = &line[k % 1], *next = &line[(k + 1) % 1];
+        double correction[6] = { 0.0 };
+        for (int i = 0; i < 6; ++i) {
+            at->residual[i][lane] = residual[i];
+            for (int j = 0; j < 6; ++j) correction[i] -= at->gain[i * 6 + j][lane] * residual[j];
+        }
+        for (int i = 0; i < 6; ++i) {
+            const double change = at->increment[i][lane], total = sum[i] + change, added = total - sum[i];
+            const double turn = (next->displacement[i][after] - at->displacement[i][lane]) - change;
+            residual[i] = ((next->y[i][after] - at->y[i][lane]) + turn) + (residual[i] - correction[i]);
+            small[i] += ((sum[i] - (total - added)) + (change - added)) + correction[i];
+            sum[i] = total;
+        }
+    }
+    for (int i = 0; i < 6; ++i) {
+        x[i] = sum[i] + small[i];
+        carry[i] = small[i] - (x[i] - sum[i]);
+    }
+}
+
+/* Bring the table up to date. */
+static void kowalevski_top_tell(const kowalevski_top_solver *s, kowalevski_top_table *table)
+{
+    for (int stage = 0; stage < 1; ++stage) {
+        if (table->fits[stage] == s->memory[stage].fits) continue;
+        table->fits[stage] = s->memory[stage].fits;
+        for (int k = 0; k < 172; ++k)
+            for (int lane = 0; lane < kowalevski_top_LANES; ++lane) table->coef[stage][k][lane] = s->coef[stage][k];
+        memcpy(table->weight[stage], s->memory[stage].weight, sizeof table->weight[stage]);
+    }
+}
+
+/* The guesses for the next kowalevski_top_LANES values. */
+static void kowalevski_top_foresee(const kowalevski_top_memory *memory, kowalevski_top_lanes weight[restrict][6],
+    kowalevski_top_lanes y[restrict 6])
+{
+    const int last = memory->count - 1;
+    for (int i = 0; i < 6; ++i) {
+        kowalevski_top_EACH_LANE
+        for (int lane = 0; lane < kowalevski_top_LANES; ++lane) {
+            double even = 0.0, odd = 0.0;
+            for (int k = 0; k < 32; k += 2) {
+                even += weight[k][i][lane] * memory->past[last - k][i];
+                odd += weight[k + 1][i][lane] * memory->past[last - 1 - k][i];
+            }
+            y[i][lane] = even + odd;
+        }
+    }
+}
+
+/* Correct y by the residuals that the chain found. The largest size of a correction; infinite if one is not finite. */
+static double kowalevski_top_correct(kowalevski_top_lines *line)
+{
+    kowalevski_top_lanes size, delta[6];
+    double largest = 0.0, total = 0.0;
+    memset(delta, 0, sizeof delta);
+    for (int i = 0; i < 6; ++i)
+        for (int j = 0; j < 6; ++j) {
+            kowalevski_top_EACH_LANE
+            for (int lane = 0; lane < kowalevski_top_LANES; ++lane)
+                delta[i][lane] += line->inverse[i * 6 + j][lane] * line->residual[j][lane];
+        }
+    kowalevski_top_sizes(line->y, delta, size);
+    for (int i = 0; i < 6; ++i)
+        for (int lane = 0; lane < kowalevski_top_LANES; ++lane) line->y[i][lane] -= delta[i][lane];
+    for (int lane = 0; lane < kowalevski_top_LANES; ++lane) {
+        total += size[lane];
+        largest = size[lane] > largest ? size[lane] : largest;
+    }
+    return isfinite(total) ? largest : HUGE_VAL;
+}
+
+/* kowalevski_top_LANES steps at once: guess the points of all, and correct them together until the error that remains is as
+   small as after a single step. 0, and the solver as before, where that does not come about. */
+static int kowalevski_top_block(kowalevski_top_solver *s, kowalevski_top_table *table)
+{
+    kowalevski_top_lines line[1];
+    double x[6], carry[6], value[6], previous = HUGE_VAL;
+    int passes = 0, solved = 0;
+    for (int stage = 0; stage < 1; ++stage)
+        kowalevski_top_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
+    while (!solved) {
+        double size = 0.0;
+        for (int stage = 0; stage < 1; ++stage) kowalevski_top_tabulate(table->coef[stage], &line[stage]);
+        memcpy(x, s->x, sizeof x);
+        memcpy(carry, s->carry, sizeof carry);
+        kowalevski_top_chain(line, x, carry);
+        for (int stage = 0; stage < 1; ++stage) size = fmax(size, kowalevski_top_correct(&line[stage]));
+        s->evaluations += 1 * kowalevski_top_LANES;
+        const double growth = size / (previous * previous);
+        /* The second test: after the square of so small a correction there is rounding only. */
+        solved = size * size * (growth > 1.0 ? growth : 1.0) <= 1e-20 || (previous < 1e-8 && size < 1e-10);
+        if (++passes == 4 || !(size < previous)) break;
+        previous = size;
+    }
+    for (int i = 0; i < 6; ++i)
+        if (!isfinite(x[i])) return 0;
+    if (!solved) return 0;
+    memcpy(s->x, x, sizeof x);
+    memcpy(s->carry, carry, sizeof carry);
+    s->steps += kowalevski_top_LANES;
+    for (int stage = 0; stage < 1; ++stage) {
+        kowalevski_top_memory *memory = &s->memory[stage];
+        for (int lane = 0; lane < kowalevski_top_LANES; ++lane) {
+            for (int i = 0; i < 6; ++i) value[i] = line[stage].y[i][lane];
+            kowalevski_top_record(memory, value);
+        }
+        memory->slow = passes > 1 ? memory->slow + kowalevski_top_LANES : 0;
+        if (memory->slow > memory->patience) kowalevski_top_fit(memory);
+    }
+    return 1;
+}
+
+/* Whether a block may be tried: not before there are recurrences to guess with, and not for a while after one that
+   failed. They take a thousand steps to repay. */
+static int kowalevski_top_may_block(kowalevski_top_solver *s, double h, size_t steps)
+{
+    int fit = s->setback > 0 && s->steps - s->fitted >= 1000;
+    if (!s->ready || memcmp(&h, &s->h, sizeof h) != 0 || steps < kowalevski_top_LANES) return 0;
+    if (s->pause > 0) {
+        --s->pause;
+        return 0;
+    }
+    for (int stage = 0; stage < 1; ++stage) {
+        fit = fit || s->memory[stage].fits == 0;
+        if (s->memory[stage].count < 96) return 0;
+    }
+    if (fit && steps < 1000) return 0;
+    for (int stage = 0; stage < 1 && fit; ++stage) kowalevski_top_fit(&s->memory[stage]);
+    if (fit) s->fitted = s->steps;
+    return 1;
+}
+
+/* Blocks of steps where the motion can be foreseen, single steps elsewhere: the results differ by round-off only. */
 kowalevski_top_status kowalevski_top_integrate(kowalevski_top_solver *s, double h, size_t steps)
 {
-    for (size_t k = 0; k < steps; ++k) {
+    kowalevski_top_table table;
+    for (int stage = 0; stage < 1; ++stage) table.fits[stage] = -1;
+    while (steps > 0) {
+        if (s != NULL && kowalevski_top_may_block(s, h, steps)) {
+            kowalevski_top_tell(s, &table);
+            if (kowalevski_top_block(s, &table)) {
+                steps -= kowalevski_top_LANES;
+                s->setback /= 2;
+                continue;
+            }
+            s->setback = 2 * s->setback + kowalevski_top_LANES > 1000 ? 1000 : 2 * s->setback + kowalevski_top_LANES;
+            s->pause = s->setback;
+        }
         const kowalevski_top_status status = kowalevski_top_step(s, h);
         if (status != kowalevski_top_OK) return status;
+        --steps;
     }
     return kowalevski_top_OK;
 }

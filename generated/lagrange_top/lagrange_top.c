@@ -13,12 +13,13 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: bd182d763c5a64ba9b8c32c54461e4a133aac94fc36bffc8d306899118ba90f2
+ * body-sha256: 6a453c55db44cea4e475e4ea1da47df478498085194692b66da5ad7d9ad1ab63
  */
 #include "lagrange_top.h"
 
 #include <float.h>
 #include <math.h>
+#include <stdint.h>
 #include <string.h>
 
 const lagrange_top_params lagrange_top_default_params = { 2.0, 1.0, 1.0 };
@@ -644,119 +645,128 @@ static int lagrange_top_solve(double matrix[36], double side[6])
     return 1;
 }
 
-/* Keep the backward differences of a vector that varies slowly from step to step (y - x), and choose how
-   many of them to extrapolate with next time: the first difference left out estimates the error of the guess. */
-static void lagrange_top_difference(lagrange_top_memory *memory, const double value[6])
+/* The guess for the next value (y), from earlier ones; 0 if there are none. */
+static int lagrange_top_predict(const lagrange_top_memory *memory, double value[6])
 {
-    double row[6], least = HUGE_VAL;
-    const int rows = memory->rows < 8 ? memory->rows + 1 : 8;
-    memcpy(row, value, sizeof row);
-    for (int k = 0; k < rows; ++k) {
-        double size = 0.0;
-        for (int i = 0; i < 6; ++i) {
-            const double before = k < memory->rows ? memory->lag[k][i] : 0.0;
-            memory->lag[k][i] = row[i];
-            size += fabs(row[i]);
-            row[i] -= before;
+    const int last = memory->count - 1;
+    double odd[6] = { 0.0 }, binomial = -1.0;
+    memset(value, 0, 6 * sizeof value[0]);
+    if (memory->fitting) {
+        for (int k = 0; k < 32; k += 2)
+            for (int i = 0; i < 6; ++i) {
+                value[i] += memory->weight[k][i][0] * memory->past[last - k][i];
+                odd[i] += memory->weight[k + 1][i][0] * memory->past[last - 1 - k][i];
+            }
+        for (int i = 0; i < 6; ++i) value[i] += odd[i];
+    } else {
+        for (int k = 0; k < memory->order && k <= last; ++k) {
+            binomial *= -(double)(memory->order - k) / (k + 1);
+            for (int i = 0; i < 6; ++i) value[i] += binomial * memory->past[last - k][i];
         }
+    }
+    return last >= 0;
+}
+
+/* Choose the guess that would have been best for a value that took several iterations. */
+static void lagrange_top_judge(lagrange_top_memory *memory, const double value[6])
+{
+    double row[8 + 1][6], guess[6], least = HUGE_VAL, fitted = HUGE_VAL;
+    const int rows = memory->count < 8 ? memory->count : 8;
+    memcpy(row[0], value, sizeof row[0]);
+    for (int k = 0; k < rows; ++k) memcpy(row[k + 1], memory->past[memory->count - 1 - k], sizeof row[0]);
+    for (int order = 1; order <= rows; ++order) { /* row[0] becomes the backward difference of this order */
+        double size = 0.0;
+        for (int k = 0; k <= rows - order; ++k)
+            for (int i = 0; i < 6; ++i) row[k][i] -= row[k + 1][i];
+        for (int i = 0; i < 6; ++i) size += fabs(row[0][i]);
         if (size < least) {
             least = size;
-            memory->guess = k;
+            memory->order = order;
         }
     }
-    memory->rows = rows;
-}
-
-/* The guess of the better predictor; zero without a history. Both are kept, to be judged by the solved value. */
-static void lagrange_top_predict(lagrange_top_memory *memory, double value[6])
-{
-    double(*guess)[6] = memory->predicted;
-    memset(memory->predicted, 0, sizeof memory->predicted);
-    for (int k = 0; k < memory->guess; ++k)
-        for (int i = 0; i < 6; ++i) guess[0][i] += memory->lag[k][i];
-    if (memory->trained) {
-        const int last = memory->count - 1;
-        double odd[6] = { 0.0 };
-        for (int k = 0; k < 16; k += 2)
-            for (int i = 0; i < 6; ++i) {
-                guess[1][i] += memory->weight[k][i] * memory->past[last - k][i];
-                odd[i] += memory->weight[k + 1][i] * memory->past[last - 1 - k][i];
-            }
-        for (int i = 0; i < 6; ++i) guess[1][i] += odd[i];
+    memory->fitting = memory->fits > 0;
+    if (memory->fitting && lagrange_top_predict(memory, guess)) {
+        fitted = 0.0;
+        for (int i = 0; i < 6; ++i) fitted += fabs(value[i] - guess[i]);
     }
-    memcpy(value, guess[memory->trained && memory->error[1] <= memory->error[0]], 6 * sizeof value[0]);
+    memory->fitting = memory->fits > 0 && fitted <= least;
+    if (memory->order == 0) memory->order = 1;
 }
 
-/* Fit the recurrence value[m] = sum of weight[k] * value[m - 1 - k] to the history, component by component: ridge
-   least squares by modified Gram-Schmidt, the ridge at the level of rounding. */
+/* Fit the recurrences value[m + l] = sum of weight[k][..][l] * value[m - 1 - k], l = 0 ... 8 - 1, to the history,
+   component by component: ridge least squares by modified Gram-Schmidt, the ridge at the level of rounding. The last
+   8 columns of q are the right-hand sides. */
 static void lagrange_top_train(lagrange_top_memory *memory, int component)
 {
-    enum { ROWS = 80 - 16, ALL = 80 };
-    double q[16][ALL], r[16][16], b[ALL] = { 0.0 }, largest = 0.0;
-    const int first = memory->count - 80;
+    enum { WINDOW = 32, AHEAD = 8, ROWS = 96 - WINDOW - AHEAD + 1 };
+    double q[ROWS + WINDOW][WINDOW + AHEAD], r[WINDOW][WINDOW + AHEAD], largest = 0.0;
     memset(q, 0, sizeof q);
-    for (int i = 0; i < 80; ++i)
-        if (fabs(memory->past[first + i][component]) > largest) largest = fabs(memory->past[first + i][component]);
-    for (int k = 0; k < 16; ++k) {
-        for (int i = 0; i < ROWS; ++i) q[k][i] = memory->past[first + i + 16 - 1 - k][component];
-        q[k][ROWS + k] = 1e-13 * largest;
-    }
-    for (int i = 0; i < ROWS; ++i) b[i] = memory->past[first + i + 16][component];
-    for (int k = 0; k < 16; ++k) {
-        double norm = 0.0, along = 0.0;
-        for (int i = 0; i < ALL; ++i) norm += q[k][i] * q[k][i];
-        r[k][k] = sqrt(norm);
-        for (int i = 0; i < ALL; ++i) q[k][i] = norm > 0.0 ? q[k][i] / r[k][k] : 0.0;
-        for (int j = k + 1; j < 16; ++j) {
-            double dot = 0.0;
-            for (int i = 0; i < ALL; ++i) dot += q[k][i] * q[j][i];
-            r[k][j] = dot;
-            for (int i = 0; i < ALL; ++i) q[j][i] -= dot * q[k][i];
+    memset(r, 0, sizeof r);
+    for (int i = 0; i < ROWS; ++i) {
+        for (int j = 0; j < WINDOW + AHEAD; ++j) {
+            const int place = j < WINDOW ? WINDOW - 1 - j : j;
+            q[i][j] = memory->past[memory->count - 96 + i + place][component];
         }
-        for (int i = 0; i < ALL; ++i) along += q[k][i] * b[i];
-        memory->weight[k][component] = along;
-        for (int i = 0; i < ALL; ++i) b[i] -= along * q[k][i];
+        if (fabs(q[i][0]) > largest) largest = fabs(q[i][0]);
     }
-    for (int k = 16 - 1; k >= 0; --k) {
-        double sum = memory->weight[k][component];
-        for (int j = k + 1; j < 16; ++j) sum -= r[k][j] * memory->weight[j][component];
-        memory->weight[k][component] = r[k][k] > 0.0 ? sum / r[k][k] : 0.0;
+    for (int k = 0; k < WINDOW; ++k) q[ROWS + k][k] = 1e-13 * largest;
+    for (int k = 0; k < WINDOW; ++k) {
+        for (int i = 0; i < ROWS + WINDOW; ++i)
+            for (int j = k; j < WINDOW + AHEAD; ++j) r[k][j] += q[i][k] * q[i][j];
+        const double scale = r[k][k] > 0.0 ? 1.0 / r[k][k] : 0.0;
+        for (int j = k + 1; j < WINDOW + AHEAD; ++j) r[k][j] *= scale;
+        for (int i = 0; i < ROWS + WINDOW; ++i)
+            for (int j = k + 1; j < WINDOW + AHEAD; ++j) q[i][j] -= q[i][k] * r[k][j];
     }
+    for (int l = 0; l < AHEAD; ++l)
+        for (int k = WINDOW - 1; k >= 0; --k) {
+            double sum = r[k][WINDOW + l];
+            for (int j = k + 1; j < WINDOW; ++j) sum -= r[k][j] * memory->weight[j][component][l];
+            memory->weight[k][component][l] = sum;
+        }
 }
 
-/* Take in the solved value: update both predictors and their errors, and fit the recurrence when steps have been
-   taking several iterations. */
-static void lagrange_top_remember(lagrange_top_memory *memory, const double value[6], int iterations)
+/* Add a value to the history. */
+static void lagrange_top_record(lagrange_top_memory *memory, const double value[6])
 {
-    for (int kind = 0; kind < 2; ++kind) {
-        double error = 0.0;
-        for (int i = 0; i < 6; ++i) error += fabs(value[i] - memory->predicted[kind][i]);
-        memory->error[kind] = fmax(0.8 * memory->error[kind], error);
-    }
-    lagrange_top_difference(memory, value);
-    if (memory->count == 160) {
-        memmove(memory->past, memory->past + 160 - 80, 80 * sizeof memory->past[0]);
-        memory->count = 80;
+    if (memory->count == 192) {
+        memmove(memory->past, memory->past + 192 - 96, 96 * sizeof memory->past[0]);
+        memory->count = 96;
     }
     memcpy(memory->past[memory->count++], value, 6 * sizeof value[0]);
-    memory->slow = iterations > 1 ? memory->slow + 1 : 0;
-    if (memory->slow >= 80 && memory->count >= 80) {
-        for (int i = 0; i < 6; ++i) lagrange_top_train(memory, i);
-        memory->trained = 1;
-        memory->error[1] = 0.0;
-        memory->slow = -80;
-    }
 }
 
-/* x + change in compensated arithmetic. 0, and x as before, if the sum is not finite. */
-static int lagrange_top_advance(lagrange_top_solver *s, const double change[6])
+/* Fit the recurrence to the last values; with every time, wait longer before it is done again. */
+static void lagrange_top_fit(lagrange_top_memory *memory)
+{
+    for (int i = 0; i < 6; ++i) lagrange_top_train(memory, i);
+    memory->fitting = 1;
+    ++memory->fits;
+    memory->slow = 0;
+    memory->patience = memory->patience < 10000 ? 2 * memory->patience + 96 : 20000;
+}
+
+/* Take in the solved value: what took one iteration needs no better guess. */
+static void lagrange_top_remember(lagrange_top_memory *memory, const double value[6], int iterations)
+{
+    if (iterations > 1) lagrange_top_judge(memory, value);
+    lagrange_top_record(memory, value);
+    memory->slow = iterations > 1 ? memory->slow + 1 : 0;
+    if (memory->slow > memory->patience && memory->count >= 96) lagrange_top_fit(memory);
+}
+
+/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last
+   bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the
+   sum is not finite. */
+static int lagrange_top_advance(lagrange_top_solver *s, const double change[6], const double correction[6])
 {
     double x[6], carry[6];
     for (int i = 0; i < 6; ++i) {
-        const double addend = change[i] + s->carry[i];
-        x[i] = s->x[i] + addend;
-        const double added = x[i] - s->x[i];
-        carry[i] = (s->x[i] - (x[i] - added)) + (addend - added);
+        const double sum = s->x[i] + change[i], added = sum - s->x[i];
+        const double lost = (s->x[i] - (sum - added)) + (change[i] - added);
+        const double small = lost + (s->carry[i] + correction[i]);
+        x[i] = sum + small;
+        carry[i] = small - (x[i] - sum);
         if (!isfinite(x[i])) return 0;
     }
     memcpy(s->x, x, sizeof x);
@@ -780,20 +790,19 @@ static double lagrange_top_size(const double y[6], const double delta[6])
 
 /* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the extrapolated guess, and advance. The
    increment is corrected to first order by the last Newton correction, so that correction costs no evaluation:
-   a correction is accepted when the error that remains after it, quadratic in it, is below 1e-18. */
+   a correction is accepted when the error that remains after it, quadratic in it, is below 1e-20. */
 static lagrange_top_status lagrange_top_attempt(lagrange_top_solver *s, int stage)
 {
     const double *coef = s->coef[stage];
     lagrange_top_memory *memory = &s->memory[stage];
     double y[6], delta[6], displacement[6], increment[6];
     double jacobian[36], increment_jacobian[36];
-    lagrange_top_predict(memory, y);
-    for (int i = 0; i < 6; ++i) y[i] += s->x[i];
+    if (!lagrange_top_predict(memory, y)) memcpy(y, s->x, sizeof y);
     double previous = HUGE_VAL;
     for (int iteration = 0; iteration < 20; ++iteration) {
         lagrange_top_linearise(coef, y, displacement, increment, jacobian, increment_jacobian);
         ++s->evaluations;
-        for (int i = 0; i < 6; ++i) delta[i] = ((y[i] - s->x[i]) - s->carry[i]) + displacement[i];
+        for (int i = 0; i < 6; ++i) delta[i] = ((y[i] - s->x[i]) + displacement[i]) - s->carry[i];
         const int regular = lagrange_top_solve(jacobian, delta);
         const double size = lagrange_top_size(y, delta);
         if (!isfinite(size)) return lagrange_top_NOT_FINITE;
@@ -802,14 +811,12 @@ static lagrange_top_status lagrange_top_attempt(lagrange_top_solver *s, int stag
         const double growth = size / (previous * previous);
         const double remaining = size * size * (growth > 1.0 ? growth : 1.0);
         /* The second test: corrections no longer shrink, the solve has reached the level of rounding. */
-        if (remaining <= 1e-18 || (previous < 1e-8 && size > 0.25 * previous)) {
-            double offset[6];
-            for (int i = 0; i < 6; ++i) {
-                offset[i] = y[i] - s->x[i];
-                for (int j = 0; j < 6; ++j) increment[i] -= increment_jacobian[i * 6 + j] * delta[j];
-            }
-            if (!lagrange_top_advance(s, increment)) return lagrange_top_NOT_FINITE;
-            lagrange_top_remember(memory, offset, iteration + 1);
+        if (remaining <= 1e-20 || (previous < 1e-8 && size > 0.25 * previous)) {
+            double correction[6] = { 0.0 };
+            for (int i = 0; i < 6; ++i)
+                for (int j = 0; j < 6; ++j) correction[i] -= increment_jacobian[i * 6 + j] * delta[j];
+            if (!lagrange_top_advance(s, increment, correction)) return lagrange_top_NOT_FINITE;
+            lagrange_top_remember(memory, y, iteration + 1);
             return lagrange_top_OK;
         }
         previous = size;
@@ -826,7 +833,7 @@ static lagrange_top_status lagrange_top_stages(lagrange_top_solver *s)
     memcpy(carry, s->carry, sizeof carry);
     for (int stage = 0; stage < 1; ++stage) {
         lagrange_top_status status = lagrange_top_attempt(s, stage);
-        if (status != lagrange_top_OK && s->memory[stage].rows > 0) {
+        if (status != lagrange_top_OK && s->memory[stage].count > 0) {
             memset(&s->memory[stage], 0, sizeof s->memory[stage]);
             status = lagrange_top_attempt(s, stage);
         }
@@ -866,11 +873,766 @@ lagrange_top_status lagrange_top_step(lagrange_top_solver *s, double h)
     return status;
 }
 
+/*
+ * Eight at a time: below, the formulas of a step are evaluated for 8 steps of a trajectory, or members of an
+ * ensemble, at once. Compilers make vector instructions of the loops over lanes.
+ */
+enum { lagrange_top_LANES = 8 };
+
+#if defined(__GNUC__)
+typedef double lagrange_top_lanes[lagrange_top_LANES] __attribute__((aligned(64))); /* a value in each lane */
+#else
+typedef double lagrange_top_lanes[lagrange_top_LANES];
+#endif
+
+#if defined(__clang__)
+#define lagrange_top_EACH_LANE _Pragma("clang loop vectorize(assume_safety)")
+#pragma clang diagnostic ignored "-Wpass-failed"
+#elif defined(__GNUC__)
+#define lagrange_top_EACH_LANE _Pragma("GCC ivdep") _Pragma("GCC unroll 1")
+#else
+#define lagrange_top_EACH_LANE
+#endif
+
+/* What all blocks share: coefficients, the same in each lane, and the recurrences by which they are foreseen. */
+typedef struct {
+    int fits[1]; /* the fit that weight is of; -1 for none */
+    lagrange_top_lanes coef[1][8], weight[1][32][6];
+} lagrange_top_table;
+
+/* A stage in all lanes, linear around y: a residual r of alpha(y) = x takes inverse r from y and gain r from the
+   increment. */
+typedef struct {
+    lagrange_top_lanes y[6], displacement[6], increment[6], residual[6];
+    lagrange_top_lanes inverse[36], slope[36], gain[36];
+} lagrange_top_lines;
+
+/* lagrange_top_phi0 for the loops over lanes: no branches. Infinite beyond |s| = 4.0. */
+static inline double lagrange_top_phi0_lane(double s)
+{
+    double sum = 1.455172475614865e-27;
+    sum = sum * s + 5.744790668872202e-26;
+    sum = sum * s + 2.267952452337683e-24;
+    sum = sum * s + 8.953517427037546e-23;
+    sum = sum * s + 3.534707039629467e-21;
+    sum = sum * s + 1.3954464685812522e-19;
+    sum = sum * s + 5.5090028283602295e-18;
+    sum = sum * s + 2.174868698558062e-16;
+    sum = sum * s + 8.586062056277845e-15;
+    sum = sum * s + 3.3896802963225827e-13;
+    sum = sum * s + 1.3382536530684679e-11;
+    sum = sum * s + 5.284190138687493e-10;
+    sum = sum * s + 2.08767569878681e-08;
+    sum = sum * s + 8.267195767195768e-07;
+    sum = sum * s + 3.306878306878307e-05;
+    sum = sum * s + 0.001388888888888889;
+    sum = sum * s + 0.08333333333333333;
+    return sum + (fabs(s) <= 4.0 ? 0.0 : HUGE_VAL);
+}
+
+/* lagrange_top_phi1 for the loops over lanes: no branches. Infinite beyond |s| = 4.0. */
+static inline double lagrange_top_phi1_lane(double s)
+{
+    double sum = 6.266191399131027e-28;
+    sum = sum * s + 2.328275960983784e-26;
+    sum = sum * s + 8.617186003308303e-25;
+    sum = sum * s + 3.1751334332727565e-23;
+    sum = sum * s + 1.163957265514881e-21;
+    sum = sum * s + 4.241648447555361e-20;
+    sum = sum * s + 1.5349911154393775e-18;
+    sum = sum * s + 5.5090028283602297e-17;
+    sum = sum * s + 1.9573818287022555e-15;
+    sum = sum * s + 6.868849645022276e-14;
+    sum = sum * s + 2.372776207425808e-12;
+    sum = sum * s + 8.029521918410807e-11;
+    sum = sum * s + 2.6420950693437467e-09;
+    sum = sum * s + 8.35070279514724e-08;
+    sum = sum * s + 2.48015873015873e-06;
+    sum = sum * s + 6.613756613756614e-05;
+    sum = sum * s + 0.001388888888888889;
+    return sum + (fabs(s) <= 4.0 ? 0.0 : HUGE_VAL);
+}
+
+/* lagrange_top_phi2 for the loops over lanes: no branches. Infinite beyond |s| = 4.0. */
+static inline double lagrange_top_phi2_lane(double s)
+{
+    double sum = 2.8570406826710835e-28;
+    sum = sum * s + 1.0025906238609643e-26;
+    sum = sum * s + 3.492413941475676e-25;
+    sum = sum * s + 1.2064060404631625e-23;
+    sum = sum * s + 4.127673463254583e-22;
+    sum = sum * s + 1.3967487186178574e-20;
+    sum = sum * s + 4.665813292310897e-19;
+    sum = sum * s + 1.5349911154393774e-17;
+    sum = sum * s + 4.958102545524207e-16;
+    sum = sum * s + 1.5659054629618044e-14;
+    sum = sum * s + 4.808194751515593e-13;
+    sum = sum * s + 1.4236657244554848e-11;
+    sum = sum * s + 4.0147609592054037e-10;
+    sum = sum * s + 1.0568380277374987e-08;
+    sum = sum * s + 2.505210838544172e-07;
+    sum = sum * s + 4.96031746031746e-06;
+    sum = sum * s + 6.613756613756614e-05;
+    return sum + (fabs(s) <= 4.0 ? 0.0 : HUGE_VAL);
+}
+
+/* lagrange_top_linearise_lanes_part1 (part 1 of 2) */
+lagrange_top_APART static void lagrange_top_linearise_lanes_part1(lagrange_top_lanes coef[restrict 8],
+                                                                  lagrange_top_lanes y[restrict 6],
+                                                                  lagrange_top_lanes displacement[restrict 6],
+                                                                  lagrange_top_lanes increment[restrict 6],
+                                                                  lagrange_top_lanes jacobian[restrict 36],
+                                                                  lagrange_top_lanes increment_jacobian[restrict 36],
+                                                                  lagrange_top_lanes work[restrict 113])
+{
+    lagrange_top_EACH_LANE
+    for (int lane = 0; lane < lagrange_top_LANES; ++lane) {
+        const double P1 = y[0][lane];
+        const double P2 = y[1][lane];
+        const double P3 = y[2][lane];
+        const double G1 = y[3][lane];
+        const double G2 = y[4][lane];
+        const double G3 = y[5][lane];
+        work[1][lane] = coef[2][lane] * (P2 * P2) + (coef[3][lane] + coef[2][lane] * (P1 * P1));
+        work[12][lane] = coef[0][lane] * (G1 * P1) + coef[0][lane] * (G2 * P2) + P3 * work[1][lane];
+        const double t2 = work[12][lane] * work[12][lane];
+        work[63][lane] = coef[1][lane] + coef[2][lane] * (P3 * P3);
+        work[112][lane] = P1 * work[63][lane];
+        work[10][lane] = coef[0][lane] * (G1 * P3) + work[112][lane];
+        const double t5 = work[10][lane] * work[10][lane];
+        work[111][lane] = P2 * work[63][lane];
+        work[3][lane] = coef[0][lane] * (G2 * P3) + work[111][lane];
+        const double t7 = work[3][lane] * work[3][lane];
+        work[27][lane] = t5 + t7;
+        work[22][lane] = t2 + work[27][lane];
+        work[18][lane] = lagrange_top_phi0_lane(work[22][lane]);
+        const double t11 = G3 * work[10][lane];
+        const double t12 = G1 * work[12][lane];
+        const double t13 = t11 - t12;
+        const double t14 = G2 * coef[4][lane];
+        const double t15 = P2 * P3;
+        work[11][lane] = t14 + coef[0][lane] * t15;
+        const double t16 = G1 * work[3][lane];
+        const double t17 = G2 * work[10][lane];
+        const double t18 = t16 - t17;
+        const double t19 = G1 * coef[4][lane];
+        const double t20 = P1 * P3;
+        work[13][lane] = t19 + coef[0][lane] * t20;
+        const double t21 = G3 * work[13][lane];
+        const double t22 = G1 * coef[5][lane];
+        const double t23 = P3 * work[10][lane];
+        const double t24 = P1 * work[12][lane];
+        const double t25 = t21 - t22 + (t23 - t24);
+        const double t26 = G1 * work[11][lane];
+        const double t27 = G2 * work[13][lane];
+        const double t28 = P1 * work[3][lane];
+        const double t29 = P2 * work[10][lane];
+        const double t30 = t26 - t27 + (t28 - t29);
+        const double t31 = coef[5][lane] * t13 - work[11][lane] * t18 + (work[12][lane] * t25 - work[3][lane] * t30);
+        work[19][lane] = lagrange_top_phi1_lane(work[22][lane]);
+        const double t33 = G2 * work[12][lane];
+        const double t34 = G3 * work[3][lane];
+        const double t35 = t33 - t34;
+        work[67][lane] = work[3][lane] * t35;
+        work[66][lane] = work[10][lane] * t13;
+        work[69][lane] = work[67][lane] - work[66][lane];
+        work[81][lane] = work[10][lane] * work[69][lane];
+        work[97][lane] = work[12][lane] * t13 - work[3][lane] * t18;
+        work[80][lane] = work[12][lane] * work[97][lane];
+        work[101][lane] = work[81][lane] - work[80][lane];
+        work[104][lane] = work[3][lane] * work[97][lane];
+        const double t44 = work[10][lane] * t18;
+        const double t45 = work[12][lane] * t35;
+        work[52][lane] = t44 - t45;
+        work[108][lane] = work[10][lane] * work[52][lane];
+        work[49][lane] = work[104][lane] - work[108][lane];
+        const double t49 = G2 * coef[5][lane];
+        const double t50 = G3 * work[11][lane];
+        const double t51 = P2 * work[12][lane];
+        const double t52 = P3 * work[3][lane];
+        const double t53 = t49 - t50 + (t51 - t52);
+        work[72][lane] = work[11][lane] * t35 - work[13][lane] * t13 + (work[3][lane] * t53 - work[10][lane] * t25);
+        work[86][lane] = work[10][lane] * work[72][lane];
+        const double t56 = work[12][lane] * t31;
+        work[88][lane] = work[13][lane] * work[69][lane] - coef[5][lane] * work[97][lane] + (work[86][lane] - t56);
+        const double t58 = work[3][lane] * t31;
+        work[46][lane] = work[13][lane] * t18 - coef[5][lane] * t35 + (work[10][lane] * t30 - work[12][lane] * t53);
+        work[41][lane] = work[10][lane] * work[46][lane];
+        work[43][lane] = work[11][lane] * work[97][lane] - work[13][lane] * work[52][lane] + (t58 - work[41][lane]);
+        const double t62 = work[22][lane] * t31 + (coef[5][lane] * work[101][lane] - work[11][lane] * work[49][lane] + (work[12][lane] * work[88][lane] - work[3][lane] * work[43][lane]));
+        work[106][lane] = work[12][lane] * work[52][lane];
+        work[110][lane] = work[3][lane] * work[69][lane];
+        work[91][lane] = work[106][lane] - work[110][lane];
+        work[57][lane] = work[12][lane] * work[46][lane];
+        work[93][lane] = work[3][lane] * work[72][lane];
+        work[60][lane] = coef[5][lane] * work[52][lane] - work[11][lane] * work[69][lane] + (work[57][lane] - work[93][lane]);
+        work[40][lane] = work[22][lane] * work[46][lane] + (work[13][lane] * work[49][lane] - coef[5][lane] * work[91][lane] + (work[10][lane] * work[43][lane] - work[12][lane] * work[60][lane]));
+        work[85][lane] = work[22][lane] * work[72][lane] + (work[11][lane] * work[91][lane] - work[13][lane] * work[101][lane] + (work[3][lane] * work[60][lane] - work[10][lane] * work[88][lane]));
+        work[99][lane] = work[22][lane] * work[97][lane] + (work[12][lane] * work[101][lane] - work[3][lane] * work[49][lane]);
+        work[107][lane] = work[22][lane] * work[52][lane] + (work[10][lane] * work[49][lane] - work[12][lane] * work[91][lane]);
+        work[109][lane] = work[22][lane] * work[69][lane] + (work[3][lane] * work[91][lane] - work[10][lane] * work[101][lane]);
+        const double t74 = G3 * coef[5][lane];
+        const double t75 = G2 * work[11][lane];
+        const double t76 = P2 * work[3][lane];
+        const double t77 = P3 * work[12][lane];
+        const double t78 = t74 + t75 + (t76 + t77);
+        work[45][lane] = work[10][lane] * work[19][lane];
+        work[36][lane] = t11 + t13;
+        const double t81 = G2 * work[3][lane];
+        const double t82 = G3 * work[12][lane];
+        const double t83 = t81 + t82;
+        const double t84 = work[12][lane] * t83;
+        work[87][lane] = work[69][lane] - work[10][lane] * work[36][lane] - t84;
+        const double t86 = work[3][lane] * t83;
+        work[35][lane] = t18 - t17;
+        const double t88 = work[10][lane] * work[35][lane];
+        work[42][lane] = t86 - (t88 + work[52][lane]);
+        work[38][lane] = t21 + (t23 + t25);
+        work[89][lane] = work[72][lane] - work[10][lane] * work[38][lane] - work[12][lane] * t78 - (coef[5][lane] * t83 + work[13][lane] * work[36][lane]);
+        work[37][lane] = t30 - t29 - t27;
+        work[44][lane] = work[11][lane] * t83 - work[13][lane] * work[35][lane] + (work[3][lane] * t78 - (work[10][lane] * work[37][lane] + work[46][lane]));
+        const double t94 = lagrange_top_phi2_lane(work[22][lane]);
+        work[39][lane] = work[10][lane] * t94;
+        const double t96 = work[19][lane] * (work[22][lane] * t78 + 2.0 * (work[10][lane] * t31) + (coef[5][lane] * work[87][lane] - work[11][lane] * work[42][lane] + (work[12][lane] * work[89][lane] - work[3][lane] * work[44][lane]))) + 2.0 * (work[39][lane] * t62);
+        work[8][lane] = t78 * work[18][lane] + 2.0 * (work[45][lane] * t31) - t96;
+        work[17][lane] = P3 * coef[0][lane];
+        work[96][lane] = t83 * work[18][lane];
+        work[98][lane] = work[22][lane] * t83;
+        work[48][lane] = t12 - t11 - t11;
+        work[82][lane] = work[69][lane] + (work[10][lane] * work[48][lane] - t84);
+        work[50][lane] = t86 - t88 + (t45 - t44);
+        work[5][lane] = work[96][lane] - work[19][lane] * (work[98][lane] + (work[12][lane] * work[82][lane] - work[3][lane] * work[50][lane]));
+        work[7][lane] = G1 * coef[0][lane] + coef[6][lane] * t20;
+        const double t106 = t25 - t24 - t22;
+        work[62][lane] = work[12][lane] * work[19][lane];
+        work[61][lane] = work[12][lane] * t94;
+        const double t109 = G1 * work[10][lane];
+        work[54][lane] = t81 + t109;
+        work[100][lane] = t13 - t12;
+        work[83][lane] = work[10][lane] * work[54][lane] - (work[12][lane] * work[100][lane] + work[97][lane]);
+        work[53][lane] = t33 + t35;
+        work[58][lane] = work[3][lane] * work[100][lane] + work[10][lane] * work[53][lane];
+        const double t115 = G1 * work[13][lane];
+        const double t116 = P1 * work[10][lane];
+        work[56][lane] = t75 + t115 + (t76 + t116);
+        work[84][lane] = work[13][lane] * work[54][lane] - coef[5][lane] * work[100][lane] + (work[10][lane] * work[56][lane] - (work[12][lane] * t106 + t31));
+        work[55][lane] = t49 + (t51 + t53);
+        work[59][lane] = work[11][lane] * work[100][lane] + work[13][lane] * work[53][lane] + (work[10][lane] * work[55][lane] + work[3][lane] * t106);
+        const double t121 = 2.0 * (work[61][lane] * t62) + work[19][lane] * (work[22][lane] * t106 + 2.0 * t56 + (coef[5][lane] * work[83][lane] - work[11][lane] * work[58][lane] + (work[88][lane] + work[12][lane] * work[84][lane] - work[3][lane] * work[59][lane])));
+        work[90][lane] = 0.5 * P2;
+        work[6][lane] = work[18][lane] * t106 + 2.0 * (work[62][lane] * t31) - t121 - work[90][lane];
+        work[15][lane] = t7 + t2;
+        work[16][lane] = work[10][lane] * work[12][lane];
+        work[20][lane] = work[10][lane] * work[16][lane] + work[12][lane] * work[15][lane];
+        work[14][lane] = work[3][lane] * work[10][lane];
+        work[21][lane] = work[10][lane] * work[14][lane] + work[3][lane] * work[15][lane];
+        work[102][lane] = work[15][lane] * work[18][lane] + work[19][lane] * (work[12][lane] * work[20][lane] + work[3][lane] * work[21][lane] - work[15][lane] * work[22][lane]);
+        work[33][lane] = work[14][lane] * work[18][lane];
+        work[34][lane] = work[14][lane] * work[22][lane];
+        work[23][lane] = work[3][lane] * work[12][lane];
+        const double t133 = work[10][lane] * work[23][lane];
+        work[30][lane] = work[14][lane] * work[12][lane];
+        work[25][lane] = t133 - work[30][lane];
+        work[24][lane] = t5 + t2;
+        work[26][lane] = work[3][lane] * work[14][lane] + work[10][lane] * work[24][lane];
+        work[32][lane] = 0.5 * work[12][lane];
+        work[105][lane] = work[33][lane] - work[19][lane] * (work[34][lane] + (work[12][lane] * work[25][lane] - work[3][lane] * work[26][lane])) - work[32][lane];
+        work[51][lane] = 0.5 * G3;
+        const double t141 = t17 - t16 - t16;
+        work[65][lane] = t35 - t34;
+        const double t143 = work[10][lane] * work[65][lane];
+        work[92][lane] = t143 - work[12][lane] * t141;
+        work[64][lane] = t109 + t82;
+        const double t146 = work[10][lane] * work[64][lane];
+        work[68][lane] = work[3][lane] * t141 - t146 + work[97][lane];
+        work[4][lane] = work[51][lane] + (t141 * work[18][lane] - work[19][lane] * (work[22][lane] * t141 + (work[108][lane] - work[104][lane] + (work[12][lane] * work[92][lane] - work[3][lane] * work[68][lane]))));
+        work[2][lane] = G2 * coef[0][lane] + coef[6][lane] * t15;
+        work[47][lane] = 0.5 * P3;
+        work[76][lane] = work[3][lane] * work[19][lane];
+        const double t152 = t26 + (t28 + t30);
+        work[75][lane] = work[3][lane] * t94;
+        work[103][lane] = t16 + t18;
+        work[94][lane] = work[12][lane] * work[103][lane] + t143;
+        work[73][lane] = work[97][lane] - work[3][lane] * work[103][lane] - t146;
+        work[71][lane] = t53 - t52 - t50;
+        work[95][lane] = coef[5][lane] * work[103][lane] + work[13][lane] * work[65][lane] + (work[12][lane] * t152 + work[10][lane] * work[71][lane]);
+        work[70][lane] = t74 + t115 + (t116 + t77);
+        work[74][lane] = t31 - work[3][lane] * t152 - work[10][lane] * work[70][lane] - (work[13][lane] * work[64][lane] + work[11][lane] * work[103][lane]);
+        const double t161 = 2.0 * (work[75][lane] * t62) + work[19][lane] * (2.0 * t58 - work[22][lane] * t152 + (coef[5][lane] * work[94][lane] - work[11][lane] * work[73][lane] + (work[12][lane] * work[95][lane] - (work[43][lane] + work[3][lane] * work[74][lane]))));
+        work[9][lane] = work[47][lane] + (2.0 * (work[76][lane] * t31) - work[18][lane] * t152 - t161);
+        work[79][lane] = 0.5 * work[3][lane];
+        work[77][lane] = work[16][lane] * work[18][lane];
+        work[78][lane] = work[16][lane] * work[22][lane];
+        work[31][lane] = work[3][lane] * work[16][lane];
+        work[28][lane] = work[31][lane] - t133;
+        work[29][lane] = work[10][lane] * work[27][lane] + work[12][lane] * work[16][lane];
+        work[0][lane] = work[79][lane] + (work[77][lane] - work[19][lane] * (work[78][lane] - (work[3][lane] * work[28][lane] + work[12][lane] * work[29][lane])));
+        increment_jacobian[17][lane] = 0.0;
+        increment_jacobian[35][lane] = 0.0;
+        increment_jacobian[30][lane] = -(G2 * work[63][lane]);
+        increment_jacobian[31][lane] = G1 * work[63][lane];
+        increment_jacobian[29][lane] = work[10][lane];
+        increment_jacobian[23][lane] = -work[3][lane];
+        increment[4][lane] = t13;
+        increment_jacobian[5][lane] = -work[11][lane];
+        increment[5][lane] = t18;
+        increment_jacobian[11][lane] = work[13][lane];
+        increment[1][lane] = t25;
+        increment[2][lane] = t30;
+        increment[3][lane] = t35;
+        increment[0][lane] = t53;
+        displacement[0][lane] = work[18][lane] * t31 - work[19][lane] * t62 - 0.5 * t53;
+        displacement[1][lane] = work[18][lane] * work[46][lane] - work[19][lane] * work[40][lane] - 0.5 * t25;
+        displacement[2][lane] = work[18][lane] * work[72][lane] - work[19][lane] * work[85][lane] - 0.5 * t30;
+        displacement[3][lane] = work[18][lane] * work[97][lane] - work[19][lane] * work[99][lane] - 0.5 * t35;
+        displacement[4][lane] = work[18][lane] * work[52][lane] - work[19][lane] * work[107][lane] - 0.5 * t13;
+        displacement[5][lane] = work[18][lane] * work[69][lane] - work[19][lane] * work[109][lane] - 0.5 * t18;
+        increment_jacobian[15][lane] = work[11][lane] - (t14 + P2 * work[17][lane]);
+        increment_jacobian[16][lane] = t19 + P1 * work[17][lane] - work[13][lane];
+        increment_jacobian[26][lane] = G3 * work[7][lane] - G1 * work[1][lane];
+        jacobian[0][lane] = 1.0 + (work[63][lane] * work[8][lane] + (work[17][lane] * work[5][lane] + work[7][lane] * work[6][lane]) - work[102][lane]);
+        increment_jacobian[20][lane] = G2 * work[1][lane] - G3 * work[2][lane];
+        jacobian[1][lane] = work[105][lane] + (work[17][lane] * work[4][lane] + (work[2][lane] * work[6][lane] + work[63][lane] * work[9][lane]));
+    }
+}
+
+/* lagrange_top_linearise_lanes_part2 (part 2 of 2) */
+lagrange_top_APART static void lagrange_top_linearise_lanes_part2(lagrange_top_lanes coef[restrict 8],
+                                                                  lagrange_top_lanes y[restrict 6],
+                                                                  lagrange_top_lanes displacement[restrict 6],
+                                                                  lagrange_top_lanes increment[restrict 6],
+                                                                  lagrange_top_lanes jacobian[restrict 36],
+                                                                  lagrange_top_lanes increment_jacobian[restrict 36],
+                                                                  lagrange_top_lanes work[restrict 113])
+{
+    (void)displacement;
+    (void)increment;
+    lagrange_top_EACH_LANE
+    for (int lane = 0; lane < lagrange_top_LANES; ++lane) {
+        const double P1 = y[0][lane];
+        const double P2 = y[1][lane];
+        const double P3 = y[2][lane];
+        const double G1 = y[3][lane];
+        const double G2 = y[4][lane];
+        const double G3 = y[5][lane];
+        const double t170 = P2 * coef[0][lane];
+        const double t171 = P1 * coef[0][lane];
+        const double t172 = work[11][lane] * work[3][lane];
+        const double t173 = coef[5][lane] * work[12][lane];
+        const double t174 = t172 + t173;
+        const double t175 = t174 + t174;
+        const double t176 = work[11][lane] * work[10][lane] + work[13][lane] * work[3][lane];
+        const double t177 = work[13][lane] * work[14][lane] + work[11][lane] * work[15][lane] + (work[10][lane] * t176 + work[3][lane] * t175);
+        const double t178 = coef[5][lane] * work[10][lane] + work[13][lane] * work[12][lane];
+        const double t179 = work[13][lane] * work[16][lane] + coef[5][lane] * work[15][lane] + (work[10][lane] * t178 + work[12][lane] * t175);
+        const double t180 = work[17][lane] * work[8][lane] + (coef[4][lane] * work[5][lane] + t171 * work[6][lane]) - (t175 * work[18][lane] + work[19][lane] * (coef[5][lane] * work[20][lane] + work[11][lane] * work[21][lane] + (work[3][lane] * t177 + work[12][lane] * t179) - work[22][lane] * t175));
+        const double t181 = t176 * work[18][lane];
+        const double t182 = t176 * work[22][lane];
+        const double t183 = work[13][lane] * work[23][lane];
+        const double t184 = coef[5][lane] * work[14][lane];
+        const double t185 = coef[5][lane] * work[3][lane] + work[11][lane] * work[12][lane];
+        const double t186 = work[10][lane] * t185;
+        const double t187 = work[12][lane] * t176;
+        const double t188 = t183 - t184 + (t186 - t187);
+        const double t189 = work[13][lane] * work[10][lane];
+        const double t190 = t189 + t173;
+        const double t191 = t190 + t190;
+        const double t192 = work[11][lane] * work[14][lane] + work[13][lane] * work[24][lane] + (work[3][lane] * t176 + work[10][lane] * t191);
+        const double t193 = t181 - work[19][lane] * (t182 + (coef[5][lane] * work[25][lane] - work[11][lane] * work[26][lane] + (work[12][lane] * t188 - work[3][lane] * t192))) - coef[7][lane] + (coef[4][lane] * work[4][lane] + (work[17][lane] * work[9][lane] + t170 * work[6][lane]));
+        const double t194 = 0.5 * work[11][lane];
+        const double t195 = t178 * work[18][lane];
+        const double t196 = t178 * work[22][lane];
+        const double t197 = t189 + t172;
+        const double t198 = t197 + t197;
+        const double t199 = work[13][lane] * work[27][lane] + coef[5][lane] * work[16][lane] + (work[10][lane] * t198 + work[12][lane] * t178);
+        const double t200 = work[11][lane] * work[16][lane];
+        const double t201 = work[3][lane] * t178;
+        const double t202 = t200 - t183 + (t201 - t186);
+        const double t203 = work[30][lane] - work[31][lane];
+        const double t204 = work[32][lane] + (work[33][lane] - work[19][lane] * (work[34][lane] - (work[12][lane] * t203 + work[10][lane] * work[21][lane])));
+        const double t205 = work[12][lane] * work[35][lane];
+        const double t206 = t205 + work[3][lane] * work[36][lane];
+        const double t207 = coef[5][lane] * work[35][lane] + work[11][lane] * work[36][lane] + (work[12][lane] * work[37][lane] + work[3][lane] * work[38][lane]);
+        const double t208 = 2.0 * (work[39][lane] * work[40][lane]) + work[19][lane] * (work[22][lane] * work[37][lane] + 2.0 * work[41][lane] + (work[13][lane] * work[42][lane] - coef[5][lane] * t206 + (work[43][lane] + work[10][lane] * work[44][lane] - work[12][lane] * t207)));
+        const double t209 = work[18][lane] * work[37][lane] + 2.0 * (work[45][lane] * work[46][lane]) - t208 - work[47][lane];
+        const double t210 = work[35][lane] * work[18][lane];
+        const double t211 = work[22][lane] * work[35][lane];
+        const double t212 = t205 - work[3][lane] * work[48][lane];
+        const double t213 = t210 - work[19][lane] * (t211 + (work[49][lane] + (work[10][lane] * work[50][lane] - work[12][lane] * t212))) - work[51][lane];
+        const double t214 = 0.5 * P1;
+        const double t215 = work[52][lane] - work[12][lane] * work[53][lane] - work[3][lane] * work[54][lane];
+        const double t216 = work[46][lane] - work[12][lane] * work[55][lane] - work[3][lane] * work[56][lane] - (work[11][lane] * work[54][lane] + coef[5][lane] * work[53][lane]);
+        const double t217 = work[19][lane] * (2.0 * work[57][lane] - work[22][lane] * work[55][lane] + (work[13][lane] * work[58][lane] - coef[5][lane] * t215 + (work[10][lane] * work[59][lane] - (work[60][lane] + work[12][lane] * t216)))) + 2.0 * (work[61][lane] * work[40][lane]);
+        const double t218 = t214 + (2.0 * (work[62][lane] * work[46][lane]) - work[18][lane] * work[55][lane] - t217);
+        const double t219 = work[64][lane] * work[18][lane];
+        const double t220 = work[64][lane] * work[22][lane];
+        const double t221 = work[12][lane] * work[64][lane];
+        const double t222 = work[3][lane] * work[65][lane];
+        const double t223 = work[66][lane] - work[67][lane] + (t221 - t222);
+        const double t224 = t219 - work[19][lane] * (t220 + (work[10][lane] * work[68][lane] - work[12][lane] * t223));
+        const double t225 = t221 - (work[69][lane] + t222);
+        const double t226 = coef[5][lane] * work[64][lane] - work[11][lane] * work[65][lane] + (work[12][lane] * work[70][lane] - (work[3][lane] * work[71][lane] + work[72][lane]));
+        const double t227 = work[19][lane] * (work[22][lane] * work[70][lane] + 2.0 * (work[3][lane] * work[46][lane]) + (work[13][lane] * work[73][lane] - coef[5][lane] * t225 + (work[10][lane] * work[74][lane] - work[12][lane] * t226))) + 2.0 * (work[75][lane] * work[40][lane]);
+        const double t228 = work[70][lane] * work[18][lane] + 2.0 * (work[76][lane] * work[46][lane]) - t227;
+        const double t229 = work[3][lane] * work[23][lane] + work[12][lane] * work[24][lane];
+        const double t230 = work[24][lane] * work[18][lane] + work[19][lane] * (work[10][lane] * work[26][lane] + work[12][lane] * t229 - work[24][lane] * work[22][lane]);
+        const double t231 = work[23][lane] * work[18][lane];
+        const double t232 = work[23][lane] * work[22][lane];
+        const double t233 = work[12][lane] * work[23][lane] + work[3][lane] * work[27][lane];
+        const double t234 = 0.5 * work[10][lane];
+        const double t235 = t231 - work[19][lane] * (t232 + (work[10][lane] * work[28][lane] - work[12][lane] * t233)) - t234;
+        const double t236 = t184 - t200 + (t187 - t201);
+        const double t237 = coef[7][lane] + (t181 - work[19][lane] * (t182 - (coef[5][lane] * t203 + work[13][lane] * work[21][lane] + (work[12][lane] * t236 + work[10][lane] * t177)))) + (work[17][lane] * t209 + (coef[4][lane] * t213 + t171 * t218));
+        const double t238 = work[11][lane] * work[23][lane] + coef[5][lane] * work[24][lane] + (work[3][lane] * t185 + work[12][lane] * t191);
+        const double t239 = coef[4][lane] * t224 + (work[17][lane] * t228 + t170 * t218) - (t191 * work[18][lane] + work[19][lane] * (work[13][lane] * work[26][lane] + coef[5][lane] * t229 + (work[10][lane] * t192 + work[12][lane] * t238) - work[22][lane] * t191));
+        const double t240 = t185 * work[18][lane];
+        const double t241 = work[22][lane] * t185;
+        const double t242 = coef[5][lane] * work[23][lane] + work[11][lane] * work[27][lane] + (work[12][lane] * t185 + work[3][lane] * t198);
+        const double t243 = 0.5 * work[13][lane];
+        const double t244 = work[77][lane] - work[19][lane] * (work[78][lane] + (work[3][lane] * t203 - work[10][lane] * work[20][lane])) - work[79][lane];
+        const double t245 = 0.5 * G2;
+        const double t246 = t245 + (work[48][lane] * work[18][lane] - work[19][lane] * (work[22][lane] * work[48][lane] + (work[80][lane] - work[81][lane] + (work[3][lane] * t212 - work[10][lane] * work[82][lane]))));
+        const double t247 = work[19][lane] * (work[22][lane] * work[56][lane] + 2.0 * (work[12][lane] * work[72][lane]) + (work[11][lane] * t215 - work[13][lane] * work[83][lane] + (work[3][lane] * t216 - work[10][lane] * work[84][lane]))) + 2.0 * (work[61][lane] * work[85][lane]);
+        const double t248 = work[56][lane] * work[18][lane] + 2.0 * (work[62][lane] * work[72][lane]) - t247;
+        const double t249 = work[19][lane] * (2.0 * work[86][lane] - work[22][lane] * work[38][lane] + (work[11][lane] * t206 - work[13][lane] * work[87][lane] + (work[3][lane] * t207 - (work[88][lane] + work[10][lane] * work[89][lane])))) + 2.0 * (work[39][lane] * work[85][lane]);
+        const double t250 = work[90][lane] + (2.0 * (work[45][lane] * work[72][lane]) - work[18][lane] * work[38][lane] - t249);
+        const double t251 = t234 + (t231 - work[19][lane] * (t232 - (work[10][lane] * work[25][lane] + work[3][lane] * t229)));
+        const double t252 = work[65][lane] * work[18][lane];
+        const double t253 = work[22][lane] * work[65][lane];
+        const double t254 = 0.5 * G1;
+        const double t255 = t252 - work[19][lane] * (t253 + (work[91][lane] + (work[3][lane] * t223 - work[10][lane] * work[92][lane]))) - t254;
+        const double t256 = work[19][lane] * (work[22][lane] * work[71][lane] + 2.0 * work[93][lane] + (work[11][lane] * t225 - work[13][lane] * work[94][lane] + (work[60][lane] + work[3][lane] * t226 - work[10][lane] * work[95][lane]))) + 2.0 * (work[75][lane] * work[85][lane]);
+        const double t257 = work[18][lane] * work[71][lane] + 2.0 * (work[76][lane] * work[72][lane]) - t256 - t214;
+        const double t258 = work[27][lane] * work[18][lane] + work[19][lane] * (work[3][lane] * t233 + work[10][lane] * work[29][lane] - work[27][lane] * work[22][lane]);
+        const double t259 = t195 - work[19][lane] * (t196 + (work[11][lane] * t203 - work[13][lane] * work[20][lane] + (work[3][lane] * t236 - work[10][lane] * t179))) - t194 + (coef[4][lane] * t246 + t171 * t248 + work[17][lane] * t250);
+        const double t260 = t243 + (t240 - work[19][lane] * (t241 - (work[13][lane] * work[25][lane] + work[11][lane] * t229 + (work[10][lane] * t188 + work[3][lane] * t238)))) + (coef[4][lane] * t255 + (t170 * t248 + work[17][lane] * t257));
+        const double t261 = work[96][lane] + 2.0 * (work[45][lane] * work[97][lane]) - (work[19][lane] * (work[98][lane] + 2.0 * (work[10][lane] * work[97][lane]) + (work[12][lane] * work[87][lane] - work[3][lane] * work[42][lane])) + 2.0 * (work[39][lane] * work[99][lane]));
+        const double t262 = work[100][lane] * work[18][lane] + 2.0 * (work[62][lane] * work[97][lane]) - (2.0 * (work[61][lane] * work[99][lane]) + work[19][lane] * (work[22][lane] * work[100][lane] + 2.0 * work[80][lane] + (work[101][lane] + work[12][lane] * work[83][lane] - work[3][lane] * work[58][lane])));
+        const double t263 = t262 - t245;
+        const double t264 = 2.0 * (work[76][lane] * work[97][lane]) - work[103][lane] * work[18][lane] - (2.0 * (work[75][lane] * work[99][lane]) + work[19][lane] * (2.0 * work[104][lane] - work[103][lane] * work[22][lane] + (work[12][lane] * work[94][lane] - (work[49][lane] + work[3][lane] * work[73][lane]))));
+        const double t265 = work[51][lane] + t264;
+        const double t266 = 2.0 * (work[62][lane] * work[52][lane]) - work[53][lane] * work[18][lane] - (work[19][lane] * (2.0 * work[106][lane] - work[22][lane] * work[53][lane] + (work[10][lane] * work[58][lane] - (work[91][lane] + work[12][lane] * t215))) + 2.0 * (work[61][lane] * work[107][lane]));
+        const double t267 = t254 + t266;
+        const double t268 = t210 + 2.0 * (work[45][lane] * work[52][lane]) - (2.0 * (work[39][lane] * work[107][lane]) + work[19][lane] * (t211 + 2.0 * work[108][lane] + (work[49][lane] + work[10][lane] * work[42][lane] - work[12][lane] * t206)));
+        const double t269 = t268 - work[51][lane];
+        const double t270 = t219 + 2.0 * (work[76][lane] * work[52][lane]) - (work[19][lane] * (t220 + 2.0 * (work[3][lane] * work[52][lane]) + (work[10][lane] * work[73][lane] - work[12][lane] * t225)) + 2.0 * (work[75][lane] * work[107][lane]));
+        const double t271 = work[54][lane] * work[18][lane] + 2.0 * (work[62][lane] * work[69][lane]) - (work[19][lane] * (work[54][lane] * work[22][lane] + 2.0 * (work[12][lane] * work[69][lane]) + (work[3][lane] * t215 - work[10][lane] * work[83][lane])) + 2.0 * (work[61][lane] * work[109][lane]));
+        const double t272 = 2.0 * (work[45][lane] * work[69][lane]) - work[36][lane] * work[18][lane] - (2.0 * (work[39][lane] * work[109][lane]) + work[19][lane] * (2.0 * work[81][lane] - work[22][lane] * work[36][lane] + (work[3][lane] * t206 - (work[101][lane] + work[10][lane] * work[87][lane]))));
+        const double t273 = t245 + t272;
+        const double t274 = t252 + 2.0 * (work[69][lane] * work[76][lane]) - (work[19][lane] * (t253 + 2.0 * work[110][lane] + (work[91][lane] + work[3][lane] * t225 - work[10][lane] * work[94][lane])) + 2.0 * (work[75][lane] * work[109][lane]));
+        const double t275 = t274 - t254;
+        const double t276 = P2 * work[7][lane];
+        const double t277 = P3 * work[63][lane];
+        const double t278 = G3 * work[17][lane];
+        const double t279 = P3 * work[17][lane];
+        const double t280 = G3 * coef[4][lane];
+        const double t281 = P1 * work[2][lane];
+        const double t282 = G2 * work[17][lane];
+        const double t283 = G1 * work[17][lane];
+        const double t284 = G1 * t170;
+        const double t285 = G2 * t171;
+        const double t286 = G2 * work[7][lane];
+        const double t287 = G3 * work[63][lane];
+        const double t288 = G1 * work[2][lane];
+        jacobian[23][lane] = work[0][lane];
+        increment_jacobian[2][lane] = P2 * work[1][lane] - P3 * work[2][lane] - G3 * t170 - work[3][lane];
+        increment_jacobian[10][lane] = -(P1 * t170);
+        jacobian[2][lane] = work[0][lane] + (t170 * work[4][lane] + (t171 * work[5][lane] + work[1][lane] * work[6][lane] + (work[7][lane] * work[8][lane] + work[2][lane] * work[9][lane])));
+        increment_jacobian[3][lane] = P2 * t171;
+        increment_jacobian[8][lane] = work[10][lane] + (P3 * work[7][lane] + (G3 * t171 - P1 * work[1][lane]));
+        jacobian[3][lane] = t180;
+        jacobian[4][lane] = t193;
+        jacobian[5][lane] = t194 + (t195 - work[19][lane] * (t196 - (work[11][lane] * work[28][lane] + coef[5][lane] * work[29][lane] + (work[12][lane] * t199 + work[3][lane] * t202))));
+        jacobian[6][lane] = t204 + (work[63][lane] * t209 + (work[17][lane] * t213 + work[7][lane] * t218));
+        jacobian[7][lane] = 1.0 + (work[17][lane] * t224 + (work[63][lane] * t228 + work[2][lane] * t218) - t230);
+        jacobian[8][lane] = t235 + (t170 * t224 + (work[2][lane] * t228 + work[7][lane] * t209 + (t171 * t213 + work[1][lane] * t218)));
+        jacobian[29][lane] = t235;
+        jacobian[9][lane] = t237;
+        jacobian[10][lane] = t239;
+        jacobian[17][lane] = -(t198 * work[18][lane] + work[19][lane] * (work[13][lane] * work[29][lane] + work[11][lane] * t233 + (work[10][lane] * t199 + work[3][lane] * t242) - t198 * work[22][lane]));
+        jacobian[11][lane] = t240 - work[19][lane] * (t241 + (work[13][lane] * work[28][lane] - coef[5][lane] * t233 + (work[10][lane] * t202 - work[12][lane] * t242))) - t243;
+        jacobian[12][lane] = t244 + (work[17][lane] * t246 + work[7][lane] * t248 + work[63][lane] * t250);
+        jacobian[13][lane] = t251 + (work[17][lane] * t255 + (work[2][lane] * t248 + work[63][lane] * t257));
+        jacobian[14][lane] = 1.0 + (t170 * t255 + (t171 * t246 + work[1][lane] * t248 + (work[7][lane] * t250 + work[2][lane] * t257)) - t258);
+        jacobian[35][lane] = 1.0 - t258;
+        jacobian[15][lane] = t259;
+        jacobian[16][lane] = t260;
+        jacobian[18][lane] = work[63][lane] * t261 + work[7][lane] * t263;
+        jacobian[21][lane] = 1.0 + (work[17][lane] * t261 + t171 * t263 - work[102][lane]);
+        jacobian[19][lane] = work[2][lane] * t263 + work[63][lane] * t265;
+        jacobian[20][lane] = work[1][lane] * t263 + (work[7][lane] * t261 + work[2][lane] * t265);
+        jacobian[22][lane] = work[105][lane] + (work[17][lane] * t265 + t170 * t263);
+        jacobian[24][lane] = work[7][lane] * t267 + work[63][lane] * t269;
+        jacobian[27][lane] = t204 + (work[17][lane] * t269 + t171 * t267);
+        jacobian[25][lane] = work[63][lane] * t270 + work[2][lane] * t267;
+        jacobian[26][lane] = work[1][lane] * t267 + (work[2][lane] * t270 + work[7][lane] * t269);
+        jacobian[28][lane] = 1.0 + (work[17][lane] * t270 + t170 * t267 - t230);
+        jacobian[30][lane] = work[7][lane] * t271 + work[63][lane] * t273;
+        jacobian[33][lane] = t244 + (t171 * t271 + work[17][lane] * t273);
+        jacobian[31][lane] = work[2][lane] * t271 + work[63][lane] * t275;
+        jacobian[32][lane] = work[1][lane] * t271 + (work[2][lane] * t275 + work[7][lane] * t273);
+        jacobian[34][lane] = t251 + (t170 * t271 + work[17][lane] * t275);
+        increment_jacobian[0][lane] = t276;
+        increment_jacobian[1][lane] = work[12][lane] + (P2 * work[2][lane] - t277 - t278);
+        increment_jacobian[6][lane] = t277 + (t278 - P1 * work[7][lane]) - work[12][lane];
+        increment_jacobian[22][lane] = G2 * t170 - t278 + work[12][lane];
+        increment_jacobian[27][lane] = t278 - G1 * t171 - work[12][lane];
+        increment_jacobian[4][lane] = coef[5][lane] + (P2 * t170 - t279 - t280);
+        increment_jacobian[9][lane] = t279 + (t280 - P1 * t171) - coef[5][lane];
+        increment_jacobian[7][lane] = -t281;
+        increment_jacobian[12][lane] = work[3][lane] - (t282 + work[111][lane]);
+        increment_jacobian[33][lane] = work[3][lane] - t282;
+        increment_jacobian[13][lane] = t283 + work[112][lane] - work[10][lane];
+        increment_jacobian[34][lane] = t283 - work[10][lane];
+        increment_jacobian[28][lane] = -t284;
+        increment_jacobian[14][lane] = t284 + (t281 - t276 - t285);
+        increment_jacobian[21][lane] = t285;
+        increment_jacobian[18][lane] = t286;
+        increment_jacobian[19][lane] = G2 * work[2][lane] - t287;
+        increment_jacobian[24][lane] = t287 - G1 * work[7][lane];
+        increment_jacobian[25][lane] = -t288;
+        increment_jacobian[32][lane] = t288 - t286;
+    }
+}
+
+/* lagrange_top_linearise in all lanes. */
+static void lagrange_top_linearise_lanes(lagrange_top_lanes coef[restrict 8], lagrange_top_lanes y[restrict 6],
+                                         lagrange_top_lanes displacement[restrict 6],
+                                         lagrange_top_lanes increment[restrict 6],
+                                         lagrange_top_lanes jacobian[restrict 36],
+                                         lagrange_top_lanes increment_jacobian[restrict 36])
+{
+    lagrange_top_lanes work[113];
+    lagrange_top_linearise_lanes_part1(coef, y, displacement, increment, jacobian, increment_jacobian, work);
+    lagrange_top_linearise_lanes_part2(coef, y, displacement, increment, jacobian, increment_jacobian, work);
+}
+
+/* Invert the matrices of all lanes in place by elimination without pivoting: they are I + O(h). Infinite where a pivot is
+   far from 1. */
+static void lagrange_top_invert(lagrange_top_lanes matrix[restrict 36])
+{
+    for (int k = 0; k < 6; ++k) {
+        lagrange_top_lanes factor[6];
+        lagrange_top_EACH_LANE
+        for (int lane = 0; lane < lagrange_top_LANES; ++lane) {
+            const double reciprocal = 1.0 / matrix[k * 6 + k][lane];
+            matrix[k * 6 + k][lane] = 1.0;
+            for (int j = 0; j < 6; ++j) matrix[k * 6 + j][lane] *= reciprocal;
+            matrix[k * 6 + k][lane] += fabs(reciprocal) < 1e3 ? 0.0 : HUGE_VAL;
+        }
+        for (int i = 0; i < 6; ++i) {
+            lagrange_top_EACH_LANE
+            for (int lane = 0; lane < lagrange_top_LANES; ++lane) {
+                factor[i][lane] = matrix[i * 6 + k][lane];
+                if (i != k) matrix[i * 6 + k][lane] = 0.0;
+            }
+        }
+        for (int i = 0; i < 6; ++i)
+            for (int j = 0; j < 6 && i != k; ++j) {
+                lagrange_top_EACH_LANE
+                for (int lane = 0; lane < lagrange_top_LANES; ++lane)
+                    matrix[i * 6 + j][lane] -= factor[i][lane] * matrix[k * 6 + j][lane];
+            }
+    }
+}
+
+/* Everything about a stage at the points y. */
+static void lagrange_top_tabulate(lagrange_top_lanes coef[restrict], lagrange_top_lines *line)
+{
+    lagrange_top_linearise_lanes(coef, line->y, line->displacement, line->increment, line->inverse, line->slope);
+    lagrange_top_invert(line->inverse);
+    for (int i = 0; i < 6; ++i)
+        for (int j = 0; j < 6; ++j) {
+            lagrange_top_lanes sum = { 0.0 };
+            for (int k = 0; k < 6; ++k) {
+                lagrange_top_EACH_LANE
+                for (int lane = 0; lane < lagrange_top_LANES; ++lane)
+                    sum[lane] += line->slope[i * 6 + k][lane] * line->inverse[k * 6 + j][lane];
+            }
+            memcpy(line->gain[i * 6 + j], sum, sizeof sum);
+        }
+}
+
+/* lagrange_top_size in all lanes, summed over the components. */
+static void lagrange_top_sizes(lagrange_top_lanes y[restrict 6], lagrange_top_lanes delta[restrict 6],
+    lagrange_top_lanes size)
+{
+    lagrange_top_lanes norm = { 0.0 };
+    memset(size, 0, lagrange_top_LANES * sizeof size[0]);
+    for (int i = 0; i < 6; ++i)
+        for (int lane = 0; lane < lagrange_top_LANES; ++lane)
+            norm[lane] = 1e-6 * fabs(y[i][lane]) > norm[lane] ? 1e-6 * fabs(y[i][lane]) : norm[lane];
+    for (int i = 0; i < 6; ++i) {
+        lagrange_top_EACH_LANE
+        for (int lane = 0; lane < lagrange_top_LANES; ++lane)
+            size[lane] += fabs(delta[i][lane]) / (fabs(y[i][lane]) + norm[lane] + DBL_MIN);
+    }
+}
+
+/* The steps of a block one after the other, each along the lines of its lane. As X, the state with its carry, gains
+   increment - gain residual, the next residual follows from this one; X itself is added up apart. */
+static void lagrange_top_chain(lagrange_top_lines line[1], double x[6], double carry[6])
+{
+    double residual[6], sum[6], small[6];
+    for (int i = 0; i < 6; ++i) {
+        residual[i] = ((line->y[i][0] - x[i]) + line->displacement[i][0]) - carry[i];
+        sum[i] = x[i];
+        small[i] = carry[i];
+    }
+    for (int k = 0; k < 1 * lagrange_top_LANES; ++k) {
+        const int lane = k / 1, after = (k + 1) / 1 % lagrange_top_LANES;
+        lagrange_top_lines *at = &line[k % 1], *next = &line[(k + 1) % 1];
+        double correction[6] = { 0.0 };
+        for (int i = 0; i < 6; ++i) {
+            at->residual[i][lane] = residual[i];
+            for (int j = 0; j < 6; ++j) correction[i] -= at->gain[i * 6 + j][lane] * residual[j];
+        }
+        for (int i = 0; i < 6; ++i) {
+            const double change = at->increment[i][lane], total = sum[i] + change, added = total - sum[i];
+            const double turn = (next->displacement[i][after] - at->displacement[i][lane]) - change;
+            residual[i] = ((next->y[i][after] - at->y[i][lane]) + turn) + (residual[i] - correction[i]);
+            small[i] += ((sum[i] - (total - added)) + (change - added)) + correction[i];
+            sum[i] = total;
+        }
+    }
+    for (int i = 0; i < 6; ++i) {
+        x[i] = sum[i] + small[i];
+        carry[i] = small[i] - (x[i] - sum[i]);
+    }
+}
+
+/* Bring the table up to date. */
+static void lagrange_top_tell(const lagrange_top_solver *s, lagrange_top_table *table)
+{
+    for (int stage = 0; stage < 1; ++stage) {
+        if (table->fits[stage] == s->memory[stage].fits) continue;
+        table->fits[stage] = s->memory[stage].fits;
+        for (int k = 0; k < 8; ++k)
+            for (int lane = 0; lane < lagrange_top_LANES; ++lane) table->coef[stage][k][lane] = s->coef[stage][k];
+        memcpy(table->weight[stage], s->memory[stage].weight, sizeof table->weight[stage]);
+    }
+}
+
+/* The guesses for the next lagrange_top_LANES values. */
+static void lagrange_top_foresee(const lagrange_top_memory *memory, lagrange_top_lanes weight[restrict][6],
+    lagrange_top_lanes y[restrict 6])
+{
+    const int last = memory->count - 1;
+    for (int i = 0; i < 6; ++i) {
+        lagrange_top_EACH_LANE
+        for (int lane = 0; lane < lagrange_top_LANES; ++lane) {
+            double even = 0.0, odd = 0.0;
+            for (int k = 0; k < 32; k += 2) {
+                even += weight[k][i][lane] * memory->past[last - k][i];
+                odd += weight[k + 1][i][lane] * memory->past[last - 1 - k][i];
+            }
+            y[i][lane] = even + odd;
+        }
+    }
+}
+
+/* Correct y by the residuals that the chain found. The largest size of a correction; infinite if one is not finite. */
+static double lagrange_top_correct(lagrange_top_lines *line)
+{
+    lagrange_top_lanes size, delta[6];
+    double largest = 0.0, total = 0.0;
+    memset(delta, 0, sizeof delta);
+    for (int i = 0; i < 6; ++i)
+        for (int j = 0; j < 6; ++j) {
+            lagrange_top_EACH_LANE
+            for (int lane = 0; lane < lagrange_top_LANES; ++lane)
+                delta[i][lane] += line->inverse[i * 6 + j][lane] * line->residual[j][lane];
+        }
+    lagrange_top_sizes(line->y, delta, size);
+    for (int i = 0; i < 6; ++i)
+        for (int lane = 0; lane < lagrange_top_LANES; ++lane) line->y[i][lane] -= delta[i][lane];
+    for (int lane = 0; lane < lagrange_top_LANES; ++lane) {
+        total += size[lane];
+        largest = size[lane] > largest ? size[lane] : largest;
+    }
+    return isfinite(total) ? largest : HUGE_VAL;
+}
+
+/* lagrange_top_LANES steps at once: guess the points of all, and correct them together until the error that remains is as
+   small as after a single step. 0, and the solver as before, where that does not come about. */
+static int lagrange_top_block(lagrange_top_solver *s, lagrange_top_table *table)
+{
+    lagrange_top_lines line[1];
+    double x[6], carry[6], value[6], previous = HUGE_VAL;
+    int passes = 0, solved = 0;
+    for (int stage = 0; stage < 1; ++stage)
+        lagrange_top_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
+    while (!solved) {
+        double size = 0.0;
+        for (int stage = 0; stage < 1; ++stage) lagrange_top_tabulate(table->coef[stage], &line[stage]);
+        memcpy(x, s->x, sizeof x);
+        memcpy(carry, s->carry, sizeof carry);
+        lagrange_top_chain(line, x, carry);
+        for (int stage = 0; stage < 1; ++stage) size = fmax(size, lagrange_top_correct(&line[stage]));
+        s->evaluations += 1 * lagrange_top_LANES;
+        const double growth = size / (previous * previous);
+        /* The second test: after the square of so small a correction there is rounding only. */
+        solved = size * size * (growth > 1.0 ? growth : 1.0) <= 1e-20 || (previous < 1e-8 && size < 1e-10);
+        if (++passes == 4 || !(size < previous)) break;
+        previous = size;
+    }
+    for (int i = 0; i < 6; ++i)
+        if (!isfinite(x[i])) return 0;
+    if (!solved) return 0;
+    memcpy(s->x, x, sizeof x);
+    memcpy(s->carry, carry, sizeof carry);
+    s->steps += lagrange_top_LANES;
+    for (int stage = 0; stage < 1; ++stage) {
+        lagrange_top_memory *memory = &s->memory[stage];
+        for (int lane = 0; lane < lagrange_top_LANES; ++lane) {
+            for (int i = 0; i < 6; ++i) value[i] = line[stage].y[i][lane];
+            lagrange_top_record(memory, value);
+        }
+        memory->slow = passes > 1 ? memory->slow + lagrange_top_LANES : 0;
+        if (memory->slow > memory->patience) lagrange_top_fit(memory);
+    }
+    return 1;
+}
+
+/* Whether a block may be tried: not before there are recurrences to guess with, and not for a while after one that
+   failed. They take a thousand steps to repay. */
+static int lagrange_top_may_block(lagrange_top_solver *s, double h, size_t steps)
+{
+    int fit = s->setback > 0 && s->steps - s->fitted >= 1000;
+    if (!s->ready || memcmp(&h, &s->h, sizeof h) != 0 || steps < lagrange_top_LANES) return 0;
+    if (s->pause > 0) {
+        --s->pause;
+        return 0;
+    }
+    for (int stage = 0; stage < 1; ++stage) {
+        fit = fit || s->memory[stage].fits == 0;
+        if (s->memory[stage].count < 96) return 0;
+    }
+    if (fit && steps < 1000) return 0;
+    for (int stage = 0; stage < 1 && fit; ++stage) lagrange_top_fit(&s->memory[stage]);
+    if (fit) s->fitted = s->steps;
+    return 1;
+}
+
+/* Blocks of steps where the motion can be foreseen, single steps elsewhere: the results differ by round-off only. */
 lagrange_top_status lagrange_top_integrate(lagrange_top_solver *s, double h, size_t steps)
 {
-    for (size_t k = 0; k < steps; ++k) {
+    lagrange_top_table table;
+    for (int stage = 0; stage < 1; ++stage) table.fits[stage] = -1;
+    while (steps > 0) {
+        if (s != NULL && lagrange_top_may_block(s, h, steps)) {
+            lagrange_top_tell(s, &table);
+            if (lagrange_top_block(s, &table)) {
+                steps -= lagrange_top_LANES;
+                s->setback /= 2;
+                continue;
+            }
+            s->setback = 2 * s->setback + lagrange_top_LANES > 1000 ? 1000 : 2 * s->setback + lagrange_top_LANES;
+            s->pause = s->setback;
+        }
         const lagrange_top_status status = lagrange_top_step(s, h);
         if (status != lagrange_top_OK) return status;
+        --steps;
     }
     return lagrange_top_OK;
 }

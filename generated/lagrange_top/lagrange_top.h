@@ -13,13 +13,12 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 20ae65c21f3ab1b984ef9d9529dd206286a136253999f543e89e381ab8dee3e2
+ * body-sha256: 9a58035a1dff423404bbb1210e032d0fd8d892816b803f1b726d84832b587e2e
  */
 #ifndef LAGRANGE_TOP_H
 #define LAGRANGE_TOP_H
 
 #include <stddef.h>
-
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -48,19 +47,17 @@ typedef enum {
     lagrange_top_BAD_ARGUMENT    /* a null pointer, or a value that is not finite */
 } lagrange_top_status;
 
-/* Recent values of the unknown of the inner solve, for its starting guess. Two predictors compete: extrapolation by
-   backward differences, and a linear recurrence fitted to the last 80 values; they affect speed only. */
+/* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
+   fitted to the last 96 values. They affect speed only. */
 typedef struct {
-    int rows;  /* rows of lag in use */
-    int guess; /* how many of them the extrapolation adds up */
-    int count; /* values in past */
-    int slow;  /* how many of the last steps took more than one iteration */
-    int trained; /* whether weight is set */
-    double lag[8][lagrange_top_DIM]; /* backward differences, order by order */
-    double past[160][lagrange_top_DIM];   /* values, the latest last */
-    double weight[16][lagrange_top_DIM]; /* of past values, the latest first */
-    double predicted[2][lagrange_top_DIM]; /* what the two predictors say of the next value */
-    double error[2];                     /* their recent errors */
+    int count;    /* values in past */
+    int order;    /* how many of them the extrapolation uses */
+    int fits;     /* how often weight has been fitted */
+    int fitting;  /* whether the recurrence is the better guess */
+    int slow;     /* how many of the last steps took more than one iteration */
+    int patience; /* how many of those before the recurrence is fitted again */
+    double past[192][lagrange_top_DIM]; /* values, the latest last */
+    double weight[32][lagrange_top_DIM][8]; /* of past values, the latest first, for the next values */
 } lagrange_top_memory;
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with lagrange_top_init. */
@@ -72,6 +69,9 @@ typedef struct {
     lagrange_top_params params;
     double h;  /* the step size that coef belongs to */
     int ready; /* whether coef has been computed */
+    int pause;   /* steps to make singly before a block is tried */
+    int setback; /* the last pause, halved with every block that succeeds */
+    size_t fitted; /* steps when recurrences were last fitted for blocks */
     double coef[1][8]; /* what depends on params and h only, for each stage */
     lagrange_top_memory memory[1];
 } lagrange_top_solver;

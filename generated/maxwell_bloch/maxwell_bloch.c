@@ -13,12 +13,13 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: fecb021f52b326d393ca6aac6e724133729aa234f8b2aad019ecad88fca28279
+ * body-sha256: 903676a3707de296a687770fdae40c25cf2a322d9296ee55f413e3cd1142b512
  */
 #include "maxwell_bloch.h"
 
 #include <float.h>
 #include <math.h>
+#include <stdint.h>
 #include <string.h>
 
 const maxwell_bloch_params maxwell_bloch_default_params = { 0 };
@@ -150,119 +151,128 @@ static int maxwell_bloch_solve(double matrix[9], double side[3])
     return 1;
 }
 
-/* Keep the backward differences of a vector that varies slowly from step to step (y - x), and choose how
-   many of them to extrapolate with next time: the first difference left out estimates the error of the guess. */
-static void maxwell_bloch_difference(maxwell_bloch_memory *memory, const double value[3])
+/* The guess for the next value (y), from earlier ones; 0 if there are none. */
+static int maxwell_bloch_predict(const maxwell_bloch_memory *memory, double value[3])
 {
-    double row[3], least = HUGE_VAL;
-    const int rows = memory->rows < 8 ? memory->rows + 1 : 8;
-    memcpy(row, value, sizeof row);
-    for (int k = 0; k < rows; ++k) {
-        double size = 0.0;
-        for (int i = 0; i < 3; ++i) {
-            const double before = k < memory->rows ? memory->lag[k][i] : 0.0;
-            memory->lag[k][i] = row[i];
-            size += fabs(row[i]);
-            row[i] -= before;
+    const int last = memory->count - 1;
+    double odd[3] = { 0.0 }, binomial = -1.0;
+    memset(value, 0, 3 * sizeof value[0]);
+    if (memory->fitting) {
+        for (int k = 0; k < 32; k += 2)
+            for (int i = 0; i < 3; ++i) {
+                value[i] += memory->weight[k][i][0] * memory->past[last - k][i];
+                odd[i] += memory->weight[k + 1][i][0] * memory->past[last - 1 - k][i];
+            }
+        for (int i = 0; i < 3; ++i) value[i] += odd[i];
+    } else {
+        for (int k = 0; k < memory->order && k <= last; ++k) {
+            binomial *= -(double)(memory->order - k) / (k + 1);
+            for (int i = 0; i < 3; ++i) value[i] += binomial * memory->past[last - k][i];
         }
+    }
+    return last >= 0;
+}
+
+/* Choose the guess that would have been best for a value that took several iterations. */
+static void maxwell_bloch_judge(maxwell_bloch_memory *memory, const double value[3])
+{
+    double row[8 + 1][3], guess[3], least = HUGE_VAL, fitted = HUGE_VAL;
+    const int rows = memory->count < 8 ? memory->count : 8;
+    memcpy(row[0], value, sizeof row[0]);
+    for (int k = 0; k < rows; ++k) memcpy(row[k + 1], memory->past[memory->count - 1 - k], sizeof row[0]);
+    for (int order = 1; order <= rows; ++order) { /* row[0] becomes the backward difference of this order */
+        double size = 0.0;
+        for (int k = 0; k <= rows - order; ++k)
+            for (int i = 0; i < 3; ++i) row[k][i] -= row[k + 1][i];
+        for (int i = 0; i < 3; ++i) size += fabs(row[0][i]);
         if (size < least) {
             least = size;
-            memory->guess = k;
+            memory->order = order;
         }
     }
-    memory->rows = rows;
-}
-
-/* The guess of the better predictor; zero without a history. Both are kept, to be judged by the solved value. */
-static void maxwell_bloch_predict(maxwell_bloch_memory *memory, double value[3])
-{
-    double(*guess)[3] = memory->predicted;
-    memset(memory->predicted, 0, sizeof memory->predicted);
-    for (int k = 0; k < memory->guess; ++k)
-        for (int i = 0; i < 3; ++i) guess[0][i] += memory->lag[k][i];
-    if (memory->trained) {
-        const int last = memory->count - 1;
-        double odd[3] = { 0.0 };
-        for (int k = 0; k < 16; k += 2)
-            for (int i = 0; i < 3; ++i) {
-                guess[1][i] += memory->weight[k][i] * memory->past[last - k][i];
-                odd[i] += memory->weight[k + 1][i] * memory->past[last - 1 - k][i];
-            }
-        for (int i = 0; i < 3; ++i) guess[1][i] += odd[i];
+    memory->fitting = memory->fits > 0;
+    if (memory->fitting && maxwell_bloch_predict(memory, guess)) {
+        fitted = 0.0;
+        for (int i = 0; i < 3; ++i) fitted += fabs(value[i] - guess[i]);
     }
-    memcpy(value, guess[memory->trained && memory->error[1] <= memory->error[0]], 3 * sizeof value[0]);
+    memory->fitting = memory->fits > 0 && fitted <= least;
+    if (memory->order == 0) memory->order = 1;
 }
 
-/* Fit the recurrence value[m] = sum of weight[k] * value[m - 1 - k] to the history, component by component: ridge
-   least squares by modified Gram-Schmidt, the ridge at the level of rounding. */
+/* Fit the recurrences value[m + l] = sum of weight[k][..][l] * value[m - 1 - k], l = 0 ... 8 - 1, to the history,
+   component by component: ridge least squares by modified Gram-Schmidt, the ridge at the level of rounding. The last
+   8 columns of q are the right-hand sides. */
 static void maxwell_bloch_train(maxwell_bloch_memory *memory, int component)
 {
-    enum { ROWS = 80 - 16, ALL = 80 };
-    double q[16][ALL], r[16][16], b[ALL] = { 0.0 }, largest = 0.0;
-    const int first = memory->count - 80;
+    enum { WINDOW = 32, AHEAD = 8, ROWS = 96 - WINDOW - AHEAD + 1 };
+    double q[ROWS + WINDOW][WINDOW + AHEAD], r[WINDOW][WINDOW + AHEAD], largest = 0.0;
     memset(q, 0, sizeof q);
-    for (int i = 0; i < 80; ++i)
-        if (fabs(memory->past[first + i][component]) > largest) largest = fabs(memory->past[first + i][component]);
-    for (int k = 0; k < 16; ++k) {
-        for (int i = 0; i < ROWS; ++i) q[k][i] = memory->past[first + i + 16 - 1 - k][component];
-        q[k][ROWS + k] = 1e-13 * largest;
-    }
-    for (int i = 0; i < ROWS; ++i) b[i] = memory->past[first + i + 16][component];
-    for (int k = 0; k < 16; ++k) {
-        double norm = 0.0, along = 0.0;
-        for (int i = 0; i < ALL; ++i) norm += q[k][i] * q[k][i];
-        r[k][k] = sqrt(norm);
-        for (int i = 0; i < ALL; ++i) q[k][i] = norm > 0.0 ? q[k][i] / r[k][k] : 0.0;
-        for (int j = k + 1; j < 16; ++j) {
-            double dot = 0.0;
-            for (int i = 0; i < ALL; ++i) dot += q[k][i] * q[j][i];
-            r[k][j] = dot;
-            for (int i = 0; i < ALL; ++i) q[j][i] -= dot * q[k][i];
+    memset(r, 0, sizeof r);
+    for (int i = 0; i < ROWS; ++i) {
+        for (int j = 0; j < WINDOW + AHEAD; ++j) {
+            const int place = j < WINDOW ? WINDOW - 1 - j : j;
+            q[i][j] = memory->past[memory->count - 96 + i + place][component];
         }
-        for (int i = 0; i < ALL; ++i) along += q[k][i] * b[i];
-        memory->weight[k][component] = along;
-        for (int i = 0; i < ALL; ++i) b[i] -= along * q[k][i];
+        if (fabs(q[i][0]) > largest) largest = fabs(q[i][0]);
     }
-    for (int k = 16 - 1; k >= 0; --k) {
-        double sum = memory->weight[k][component];
-        for (int j = k + 1; j < 16; ++j) sum -= r[k][j] * memory->weight[j][component];
-        memory->weight[k][component] = r[k][k] > 0.0 ? sum / r[k][k] : 0.0;
+    for (int k = 0; k < WINDOW; ++k) q[ROWS + k][k] = 1e-13 * largest;
+    for (int k = 0; k < WINDOW; ++k) {
+        for (int i = 0; i < ROWS + WINDOW; ++i)
+            for (int j = k; j < WINDOW + AHEAD; ++j) r[k][j] += q[i][k] * q[i][j];
+        const double scale = r[k][k] > 0.0 ? 1.0 / r[k][k] : 0.0;
+        for (int j = k + 1; j < WINDOW + AHEAD; ++j) r[k][j] *= scale;
+        for (int i = 0; i < ROWS + WINDOW; ++i)
+            for (int j = k + 1; j < WINDOW + AHEAD; ++j) q[i][j] -= q[i][k] * r[k][j];
     }
+    for (int l = 0; l < AHEAD; ++l)
+        for (int k = WINDOW - 1; k >= 0; --k) {
+            double sum = r[k][WINDOW + l];
+            for (int j = k + 1; j < WINDOW; ++j) sum -= r[k][j] * memory->weight[j][component][l];
+            memory->weight[k][component][l] = sum;
+        }
 }
 
-/* Take in the solved value: update both predictors and their errors, and fit the recurrence when steps have been
-   taking several iterations. */
-static void maxwell_bloch_remember(maxwell_bloch_memory *memory, const double value[3], int iterations)
+/* Add a value to the history. */
+static void maxwell_bloch_record(maxwell_bloch_memory *memory, const double value[3])
 {
-    for (int kind = 0; kind < 2; ++kind) {
-        double error = 0.0;
-        for (int i = 0; i < 3; ++i) error += fabs(value[i] - memory->predicted[kind][i]);
-        memory->error[kind] = fmax(0.8 * memory->error[kind], error);
-    }
-    maxwell_bloch_difference(memory, value);
-    if (memory->count == 160) {
-        memmove(memory->past, memory->past + 160 - 80, 80 * sizeof memory->past[0]);
-        memory->count = 80;
+    if (memory->count == 192) {
+        memmove(memory->past, memory->past + 192 - 96, 96 * sizeof memory->past[0]);
+        memory->count = 96;
     }
     memcpy(memory->past[memory->count++], value, 3 * sizeof value[0]);
-    memory->slow = iterations > 1 ? memory->slow + 1 : 0;
-    if (memory->slow >= 80 && memory->count >= 80) {
-        for (int i = 0; i < 3; ++i) maxwell_bloch_train(memory, i);
-        memory->trained = 1;
-        memory->error[1] = 0.0;
-        memory->slow = -80;
-    }
 }
 
-/* x + change in compensated arithmetic. 0, and x as before, if the sum is not finite. */
-static int maxwell_bloch_advance(maxwell_bloch_solver *s, const double change[3])
+/* Fit the recurrence to the last values; with every time, wait longer before it is done again. */
+static void maxwell_bloch_fit(maxwell_bloch_memory *memory)
+{
+    for (int i = 0; i < 3; ++i) maxwell_bloch_train(memory, i);
+    memory->fitting = 1;
+    ++memory->fits;
+    memory->slow = 0;
+    memory->patience = memory->patience < 10000 ? 2 * memory->patience + 96 : 20000;
+}
+
+/* Take in the solved value: what took one iteration needs no better guess. */
+static void maxwell_bloch_remember(maxwell_bloch_memory *memory, const double value[3], int iterations)
+{
+    if (iterations > 1) maxwell_bloch_judge(memory, value);
+    maxwell_bloch_record(memory, value);
+    memory->slow = iterations > 1 ? memory->slow + 1 : 0;
+    if (memory->slow > memory->patience && memory->count >= 96) maxwell_bloch_fit(memory);
+}
+
+/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last
+   bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the
+   sum is not finite. */
+static int maxwell_bloch_advance(maxwell_bloch_solver *s, const double change[3], const double correction[3])
 {
     double x[3], carry[3];
     for (int i = 0; i < 3; ++i) {
-        const double addend = change[i] + s->carry[i];
-        x[i] = s->x[i] + addend;
-        const double added = x[i] - s->x[i];
-        carry[i] = (s->x[i] - (x[i] - added)) + (addend - added);
+        const double sum = s->x[i] + change[i], added = sum - s->x[i];
+        const double lost = (s->x[i] - (sum - added)) + (change[i] - added);
+        const double small = lost + (s->carry[i] + correction[i]);
+        x[i] = sum + small;
+        carry[i] = small - (x[i] - sum);
         if (!isfinite(x[i])) return 0;
     }
     memcpy(s->x, x, sizeof x);
@@ -286,20 +296,19 @@ static double maxwell_bloch_size(const double y[3], const double delta[3])
 
 /* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the extrapolated guess, and advance. The
    increment is corrected to first order by the last Newton correction, so that correction costs no evaluation:
-   a correction is accepted when the error that remains after it, quadratic in it, is below 1e-18. */
+   a correction is accepted when the error that remains after it, quadratic in it, is below 1e-20. */
 static maxwell_bloch_status maxwell_bloch_attempt(maxwell_bloch_solver *s, int stage)
 {
     const double *coef = s->coef[stage];
     maxwell_bloch_memory *memory = &s->memory[stage];
     double y[3], delta[3], displacement[3], increment[3];
     double jacobian[9], increment_jacobian[9];
-    maxwell_bloch_predict(memory, y);
-    for (int i = 0; i < 3; ++i) y[i] += s->x[i];
+    if (!maxwell_bloch_predict(memory, y)) memcpy(y, s->x, sizeof y);
     double previous = HUGE_VAL;
     for (int iteration = 0; iteration < 20; ++iteration) {
         maxwell_bloch_linearise(coef, y, displacement, increment, jacobian, increment_jacobian);
         ++s->evaluations;
-        for (int i = 0; i < 3; ++i) delta[i] = ((y[i] - s->x[i]) - s->carry[i]) + displacement[i];
+        for (int i = 0; i < 3; ++i) delta[i] = ((y[i] - s->x[i]) + displacement[i]) - s->carry[i];
         const int regular = maxwell_bloch_solve(jacobian, delta);
         const double size = maxwell_bloch_size(y, delta);
         if (!isfinite(size)) return maxwell_bloch_NOT_FINITE;
@@ -308,14 +317,12 @@ static maxwell_bloch_status maxwell_bloch_attempt(maxwell_bloch_solver *s, int s
         const double growth = size / (previous * previous);
         const double remaining = size * size * (growth > 1.0 ? growth : 1.0);
         /* The second test: corrections no longer shrink, the solve has reached the level of rounding. */
-        if (remaining <= 1e-18 || (previous < 1e-8 && size > 0.25 * previous)) {
-            double offset[3];
-            for (int i = 0; i < 3; ++i) {
-                offset[i] = y[i] - s->x[i];
-                for (int j = 0; j < 3; ++j) increment[i] -= increment_jacobian[i * 3 + j] * delta[j];
-            }
-            if (!maxwell_bloch_advance(s, increment)) return maxwell_bloch_NOT_FINITE;
-            maxwell_bloch_remember(memory, offset, iteration + 1);
+        if (remaining <= 1e-20 || (previous < 1e-8 && size > 0.25 * previous)) {
+            double correction[3] = { 0.0 };
+            for (int i = 0; i < 3; ++i)
+                for (int j = 0; j < 3; ++j) correction[i] -= increment_jacobian[i * 3 + j] * delta[j];
+            if (!maxwell_bloch_advance(s, increment, correction)) return maxwell_bloch_NOT_FINITE;
+            maxwell_bloch_remember(memory, y, iteration + 1);
             return maxwell_bloch_OK;
         }
         previous = size;
@@ -332,7 +339,7 @@ static maxwell_bloch_status maxwell_bloch_stages(maxwell_bloch_solver *s)
     memcpy(carry, s->carry, sizeof carry);
     for (int stage = 0; stage < 1; ++stage) {
         maxwell_bloch_status status = maxwell_bloch_attempt(s, stage);
-        if (status != maxwell_bloch_OK && s->memory[stage].rows > 0) {
+        if (status != maxwell_bloch_OK && s->memory[stage].count > 0) {
             memset(&s->memory[stage], 0, sizeof s->memory[stage]);
             status = maxwell_bloch_attempt(s, stage);
         }
@@ -372,11 +379,337 @@ maxwell_bloch_status maxwell_bloch_step(maxwell_bloch_solver *s, double h)
     return status;
 }
 
+/*
+ * Eight at a time: below, the formulas of a step are evaluated for 8 steps of a trajectory, or members of an
+ * ensemble, at once. Compilers make vector instructions of the loops over lanes.
+ */
+enum { maxwell_bloch_LANES = 8 };
+
+#if defined(__GNUC__)
+typedef double maxwell_bloch_lanes[maxwell_bloch_LANES] __attribute__((aligned(64))); /* a value in each lane */
+#else
+typedef double maxwell_bloch_lanes[maxwell_bloch_LANES];
+#endif
+
+#if defined(__clang__)
+#define maxwell_bloch_EACH_LANE _Pragma("clang loop vectorize(assume_safety)")
+#pragma clang diagnostic ignored "-Wpass-failed"
+#elif defined(__GNUC__)
+#define maxwell_bloch_EACH_LANE _Pragma("GCC ivdep") _Pragma("GCC unroll 1")
+#else
+#define maxwell_bloch_EACH_LANE
+#endif
+
+/* What all blocks share: coefficients, the same in each lane, and the recurrences by which they are foreseen. */
+typedef struct {
+    int fits[1]; /* the fit that weight is of; -1 for none */
+    maxwell_bloch_lanes coef[1][3], weight[1][32][3];
+} maxwell_bloch_table;
+
+/* A stage in all lanes, linear around y: a residual r of alpha(y) = x takes inverse r from y and gain r from the
+   increment. */
+typedef struct {
+    maxwell_bloch_lanes y[3], displacement[3], increment[3], residual[3];
+    maxwell_bloch_lanes inverse[9], slope[9], gain[9];
+} maxwell_bloch_lines;
+
+/* maxwell_bloch_linearise in all lanes. */
+static void maxwell_bloch_linearise_lanes(maxwell_bloch_lanes coef[restrict 3],
+                                          maxwell_bloch_lanes y[restrict 3],
+                                          maxwell_bloch_lanes displacement[restrict 3],
+                                          maxwell_bloch_lanes increment[restrict 3],
+                                          maxwell_bloch_lanes jacobian[restrict 9],
+                                          maxwell_bloch_lanes increment_jacobian[restrict 9])
+{
+    maxwell_bloch_EACH_LANE
+    for (int lane = 0; lane < maxwell_bloch_LANES; ++lane) {
+        const double x = y[0][lane];
+        const double y_ = y[1][lane];
+        const double z = y[2][lane];
+        const double t1 = coef[1][lane] + coef[0][lane] * (x * x);
+        const double p_y = y_ * t1;
+        const double p_z = z * t1;
+        const double t2 = coef[0][lane] * (y_ * y_) + coef[0][lane] * (z * z);
+        const double p_x = x * t2;
+        const double t3 = x * p_z - p_x;
+        const double t4 = x * p_y;
+        const double t5 = coef[2][lane] * (x * y_);
+        const double t6 = 0.5 * t5;
+        const double t7 = coef[2][lane] * (x * z);
+        const double t8 = 0.5 * x;
+        const double t9 = 1.0 / 12.0 * p_y - t8;
+        const double t10 = t8 - 1.0 / 6.0 * p_y;
+        const double t11 = x * t1;
+        displacement[0][lane] = (-0.5) * p_y;
+        displacement[1][lane] = 1.0 / 12.0 * (p_z * p_y) - 0.5 * t3;
+        displacement[2][lane] = 0.5 * t4 - 1.0 / 12.0 * (p_y * p_y);
+        increment[0][lane] = p_y;
+        increment[1][lane] = t3;
+        increment[2][lane] = -t4;
+        jacobian[0][lane] = 1.0 - t6;
+        jacobian[1][lane] = (-0.5) * t1;
+        jacobian[2][lane] = 0.0;
+        jacobian[3][lane] = 0.5 * t2 + 1.0 / 12.0 * (t5 * p_z) + t7 * t9 - 0.5 * p_z;
+        jacobian[4][lane] = 1.0 + (t6 + 1.0 / 12.0 * (t1 * p_z));
+        jacobian[5][lane] = 0.5 * t7 + t1 * t9;
+        jacobian[6][lane] = 0.5 * p_y + t5 * t10;
+        jacobian[7][lane] = t1 * t10;
+        jacobian[8][lane] = 1.0;
+        increment_jacobian[0][lane] = t5;
+        increment_jacobian[1][lane] = t1;
+        increment_jacobian[2][lane] = 0.0;
+        increment_jacobian[3][lane] = p_z + (x * t7 - t2);
+        increment_jacobian[4][lane] = -t5;
+        increment_jacobian[5][lane] = t11 - t7;
+        increment_jacobian[6][lane] = -(x * t5 + p_y);
+        increment_jacobian[7][lane] = -t11;
+        increment_jacobian[8][lane] = 0.0;
+    }
+}
+
+/* maxwell_bloch_invert in all lanes. */
+static void maxwell_bloch_invert_lanes(maxwell_bloch_lanes matrix[restrict 9],
+                                       maxwell_bloch_lanes slope[restrict 9],
+                                       maxwell_bloch_lanes inverse[restrict 9],
+                                       maxwell_bloch_lanes gain[restrict 9],
+                                       maxwell_bloch_lanes reciprocal[restrict 3])
+{
+    maxwell_bloch_EACH_LANE
+    for (int lane = 0; lane < maxwell_bloch_LANES; ++lane) {
+        const double t1 = 1.0 / matrix[0][lane];
+        const double t2 = matrix[1][lane] * t1;
+        const double t3 = 1.0 / (matrix[4][lane] - matrix[3][lane] * t2);
+        const double t4 = matrix[3][lane] * t1 * t3;
+        const double t5 = matrix[2][lane] * t1;
+        const double t6 = (matrix[5][lane] - matrix[3][lane] * t5) * t3;
+        const double t7 = t5 - t2 * t6;
+        const double t8 = matrix[7][lane] - matrix[6][lane] * t2;
+        const double t9 = 1.0 / (matrix[8][lane] - matrix[6][lane] * t5 - t8 * t6);
+        const double t10 = (t8 * t4 - matrix[6][lane] * t1) * t9;
+        const double t11 = t1 + t2 * t4 - t7 * t10;
+        const double t12 = t8 * t3 * t9;
+        const double t13 = t7 * t12 - t2 * t3;
+        const double t14 = t7 * t9;
+        const double t15 = t4 + t6 * t10;
+        const double t16 = t3 + t6 * t12;
+        const double t17 = t6 * t9;
+        inverse[0][lane] = t11;
+        inverse[1][lane] = t13;
+        inverse[2][lane] = -t14;
+        inverse[3][lane] = -t15;
+        inverse[4][lane] = t16;
+        inverse[5][lane] = -t17;
+        inverse[6][lane] = t10;
+        inverse[7][lane] = -t12;
+        inverse[8][lane] = t9;
+        gain[0][lane] = slope[2][lane] * t10 + (slope[0][lane] * t11 - slope[1][lane] * t15);
+        gain[1][lane] = slope[0][lane] * t13 + slope[1][lane] * t16 - slope[2][lane] * t12;
+        gain[2][lane] = slope[2][lane] * t9 - (slope[0][lane] * t14 + slope[1][lane] * t17);
+        gain[3][lane] = slope[5][lane] * t10 + (slope[3][lane] * t11 - slope[4][lane] * t15);
+        gain[4][lane] = slope[3][lane] * t13 + slope[4][lane] * t16 - slope[5][lane] * t12;
+        gain[5][lane] = slope[5][lane] * t9 - (slope[4][lane] * t17 + slope[3][lane] * t14);
+        gain[6][lane] = slope[8][lane] * t10 + (slope[6][lane] * t11 - slope[7][lane] * t15);
+        gain[7][lane] = slope[6][lane] * t13 + slope[7][lane] * t16 - slope[8][lane] * t12;
+        gain[8][lane] = slope[8][lane] * t9 - (slope[6][lane] * t14 + slope[7][lane] * t17);
+        reciprocal[0][lane] = t1;
+        reciprocal[1][lane] = t3;
+        reciprocal[2][lane] = t9;
+    }
+}
+
+/* Everything about a stage at the points y. The matrices are I + O(h): where a pivot is far from 1, all is infinite. */
+static void maxwell_bloch_tabulate(maxwell_bloch_lanes coef[restrict], maxwell_bloch_lines *line)
+{
+    maxwell_bloch_lanes jacobian[9], reciprocal[3];
+    maxwell_bloch_linearise_lanes(coef, line->y, line->displacement, line->increment, jacobian, line->slope);
+    maxwell_bloch_invert_lanes(jacobian, line->slope, line->inverse, line->gain, reciprocal);
+    for (int i = 0; i < 3; ++i) {
+        maxwell_bloch_EACH_LANE
+        for (int lane = 0; lane < maxwell_bloch_LANES; ++lane)
+            line->inverse[i][lane] += fabs(reciprocal[i][lane]) < 1e3 ? 0.0 : HUGE_VAL;
+    }
+}
+
+/* maxwell_bloch_size in all lanes, summed over the components. */
+static void maxwell_bloch_sizes(maxwell_bloch_lanes y[restrict 3], maxwell_bloch_lanes delta[restrict 3],
+    maxwell_bloch_lanes size)
+{
+    maxwell_bloch_lanes norm = { 0.0 };
+    memset(size, 0, maxwell_bloch_LANES * sizeof size[0]);
+    for (int i = 0; i < 3; ++i)
+        for (int lane = 0; lane < maxwell_bloch_LANES; ++lane)
+            norm[lane] = 1e-6 * fabs(y[i][lane]) > norm[lane] ? 1e-6 * fabs(y[i][lane]) : norm[lane];
+    for (int i = 0; i < 3; ++i) {
+        maxwell_bloch_EACH_LANE
+        for (int lane = 0; lane < maxwell_bloch_LANES; ++lane)
+            size[lane] += fabs(delta[i][lane]) / (fabs(y[i][lane]) + norm[lane] + DBL_MIN);
+    }
+}
+
+/* The steps of a block one after the other, each along the lines of its lane. As X, the state with its carry, gains
+   increment - gain residual, the next residual follows from this one; X itself is added up apart. */
+static void maxwell_bloch_chain(maxwell_bloch_lines line[1], double x[3], double carry[3])
+{
+    double residual[3], sum[3], small[3];
+    for (int i = 0; i < 3; ++i) {
+        residual[i] = ((line->y[i][0] - x[i]) + line->displacement[i][0]) - carry[i];
+        sum[i] = x[i];
+        small[i] = carry[i];
+    }
+    for (int k = 0; k < 1 * maxwell_bloch_LANES; ++k) {
+        const int lane = k / 1, after = (k + 1) / 1 % maxwell_bloch_LANES;
+        maxwell_bloch_lines *at = &line[k % 1], *next = &line[(k + 1) % 1];
+        double correction[3] = { 0.0 };
+        for (int i = 0; i < 3; ++i) {
+            at->residual[i][lane] = residual[i];
+            for (int j = 0; j < 3; ++j) correction[i] -= at->gain[i * 3 + j][lane] * residual[j];
+        }
+        for (int i = 0; i < 3; ++i) {
+            const double change = at->increment[i][lane], total = sum[i] + change, added = total - sum[i];
+            const double turn = (next->displacement[i][after] - at->displacement[i][lane]) - change;
+            residual[i] = ((next->y[i][after] - at->y[i][lane]) + turn) + (residual[i] - correction[i]);
+            small[i] += ((sum[i] - (total - added)) + (change - added)) + correction[i];
+            sum[i] = total;
+        }
+    }
+    for (int i = 0; i < 3; ++i) {
+        x[i] = sum[i] + small[i];
+        carry[i] = small[i] - (x[i] - sum[i]);
+    }
+}
+
+/* Bring the table up to date. */
+static void maxwell_bloch_tell(const maxwell_bloch_solver *s, maxwell_bloch_table *table)
+{
+    for (int stage = 0; stage < 1; ++stage) {
+        if (table->fits[stage] == s->memory[stage].fits) continue;
+        table->fits[stage] = s->memory[stage].fits;
+        for (int k = 0; k < 3; ++k)
+            for (int lane = 0; lane < maxwell_bloch_LANES; ++lane) table->coef[stage][k][lane] = s->coef[stage][k];
+        memcpy(table->weight[stage], s->memory[stage].weight, sizeof table->weight[stage]);
+    }
+}
+
+/* The guesses for the next maxwell_bloch_LANES values. */
+static void maxwell_bloch_foresee(const maxwell_bloch_memory *memory, maxwell_bloch_lanes weight[restrict][3],
+    maxwell_bloch_lanes y[restrict 3])
+{
+    const int last = memory->count - 1;
+    for (int i = 0; i < 3; ++i) {
+        maxwell_bloch_EACH_LANE
+        for (int lane = 0; lane < maxwell_bloch_LANES; ++lane) {
+            double even = 0.0, odd = 0.0;
+            for (int k = 0; k < 32; k += 2) {
+                even += weight[k][i][lane] * memory->past[last - k][i];
+                odd += weight[k + 1][i][lane] * memory->past[last - 1 - k][i];
+            }
+            y[i][lane] = even + odd;
+        }
+    }
+}
+
+/* Correct y by the residuals that the chain found. The largest size of a correction; infinite if one is not finite. */
+static double maxwell_bloch_correct(maxwell_bloch_lines *line)
+{
+    maxwell_bloch_lanes size, delta[3];
+    double largest = 0.0, total = 0.0;
+    memset(delta, 0, sizeof delta);
+    for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j) {
+            maxwell_bloch_EACH_LANE
+            for (int lane = 0; lane < maxwell_bloch_LANES; ++lane)
+                delta[i][lane] += line->inverse[i * 3 + j][lane] * line->residual[j][lane];
+        }
+    maxwell_bloch_sizes(line->y, delta, size);
+    for (int i = 0; i < 3; ++i)
+        for (int lane = 0; lane < maxwell_bloch_LANES; ++lane) line->y[i][lane] -= delta[i][lane];
+    for (int lane = 0; lane < maxwell_bloch_LANES; ++lane) {
+        total += size[lane];
+        largest = size[lane] > largest ? size[lane] : largest;
+    }
+    return isfinite(total) ? largest : HUGE_VAL;
+}
+
+/* maxwell_bloch_LANES steps at once: guess the points of all, and correct them together until the error that remains is as
+   small as after a single step. 0, and the solver as before, where that does not come about. */
+static int maxwell_bloch_block(maxwell_bloch_solver *s, maxwell_bloch_table *table)
+{
+    maxwell_bloch_lines line[1];
+    double x[3], carry[3], value[3], previous = HUGE_VAL;
+    int passes = 0, solved = 0;
+    for (int stage = 0; stage < 1; ++stage)
+        maxwell_bloch_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
+    while (!solved) {
+        double size = 0.0;
+        for (int stage = 0; stage < 1; ++stage) maxwell_bloch_tabulate(table->coef[stage], &line[stage]);
+        memcpy(x, s->x, sizeof x);
+        memcpy(carry, s->carry, sizeof carry);
+        maxwell_bloch_chain(line, x, carry);
+        for (int stage = 0; stage < 1; ++stage) size = fmax(size, maxwell_bloch_correct(&line[stage]));
+        s->evaluations += 1 * maxwell_bloch_LANES;
+        const double growth = size / (previous * previous);
+        /* The second test: after the square of so small a correction there is rounding only. */
+        solved = size * size * (growth > 1.0 ? growth : 1.0) <= 1e-20 || (previous < 1e-8 && size < 1e-10);
+        if (++passes == 4 || !(size < previous)) break;
+        previous = size;
+    }
+    for (int i = 0; i < 3; ++i)
+        if (!isfinite(x[i])) return 0;
+    if (!solved) return 0;
+    memcpy(s->x, x, sizeof x);
+    memcpy(s->carry, carry, sizeof carry);
+    s->steps += maxwell_bloch_LANES;
+    for (int stage = 0; stage < 1; ++stage) {
+        maxwell_bloch_memory *memory = &s->memory[stage];
+        for (int lane = 0; lane < maxwell_bloch_LANES; ++lane) {
+            for (int i = 0; i < 3; ++i) value[i] = line[stage].y[i][lane];
+            maxwell_bloch_record(memory, value);
+        }
+        memory->slow = passes > 1 ? memory->slow + maxwell_bloch_LANES : 0;
+        if (memory->slow > memory->patience) maxwell_bloch_fit(memory);
+    }
+    return 1;
+}
+
+/* Whether a block may be tried: not before there are recurrences to guess with, and not for a while after one that
+   failed. They take a thousand steps to repay. */
+static int maxwell_bloch_may_block(maxwell_bloch_solver *s, double h, size_t steps)
+{
+    int fit = s->setback > 0 && s->steps - s->fitted >= 1000;
+    if (!s->ready || memcmp(&h, &s->h, sizeof h) != 0 || steps < maxwell_bloch_LANES) return 0;
+    if (s->pause > 0) {
+        --s->pause;
+        return 0;
+    }
+    for (int stage = 0; stage < 1; ++stage) {
+        fit = fit || s->memory[stage].fits == 0;
+        if (s->memory[stage].count < 96) return 0;
+    }
+    if (fit && steps < 1000) return 0;
+    for (int stage = 0; stage < 1 && fit; ++stage) maxwell_bloch_fit(&s->memory[stage]);
+    if (fit) s->fitted = s->steps;
+    return 1;
+}
+
+/* Blocks of steps where the motion can be foreseen, single steps elsewhere: the results differ by round-off only. */
 maxwell_bloch_status maxwell_bloch_integrate(maxwell_bloch_solver *s, double h, size_t steps)
 {
-    for (size_t k = 0; k < steps; ++k) {
+    maxwell_bloch_table table;
+    for (int stage = 0; stage < 1; ++stage) table.fits[stage] = -1;
+    while (steps > 0) {
+        if (s != NULL && maxwell_bloch_may_block(s, h, steps)) {
+            maxwell_bloch_tell(s, &table);
+            if (maxwell_bloch_block(s, &table)) {
+                steps -= maxwell_bloch_LANES;
+                s->setback /= 2;
+                continue;
+            }
+            s->setback = 2 * s->setback + maxwell_bloch_LANES > 1000 ? 1000 : 2 * s->setback + maxwell_bloch_LANES;
+            s->pause = s->setback;
+        }
         const maxwell_bloch_status status = maxwell_bloch_step(s, h);
         if (status != maxwell_bloch_OK) return status;
+        --steps;
     }
     return maxwell_bloch_OK;
 }

@@ -13,13 +13,12 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 0d1d0e517dbee1f7cfbfba7a7dda7190f8efce1b8df0c966d14201644a259f21
+ * body-sha256: 1f4d84bedf3dcff2ecf436a531ba208b2ccb255220eb0acb5d8d302cc00d4a13
  */
 #ifndef NAMBU_PENDULUM_H
 #define NAMBU_PENDULUM_H
 
 #include <stddef.h>
-
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -46,19 +45,17 @@ typedef enum {
     nambu_pendulum_BAD_ARGUMENT    /* a null pointer, or a value that is not finite */
 } nambu_pendulum_status;
 
-/* Recent values of the unknown of the inner solve, for its starting guess. Two predictors compete: extrapolation by
-   backward differences, and a linear recurrence fitted to the last 80 values; they affect speed only. */
+/* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
+   fitted to the last 96 values. They affect speed only. */
 typedef struct {
-    int rows;  /* rows of lag in use */
-    int guess; /* how many of them the extrapolation adds up */
-    int count; /* values in past */
-    int slow;  /* how many of the last steps took more than one iteration */
-    int trained; /* whether weight is set */
-    double lag[8][nambu_pendulum_DIM]; /* backward differences, order by order */
-    double past[160][nambu_pendulum_DIM];   /* values, the latest last */
-    double weight[16][nambu_pendulum_DIM]; /* of past values, the latest first */
-    double predicted[2][nambu_pendulum_DIM]; /* what the two predictors say of the next value */
-    double error[2];                     /* their recent errors */
+    int count;    /* values in past */
+    int order;    /* how many of them the extrapolation uses */
+    int fits;     /* how often weight has been fitted */
+    int fitting;  /* whether the recurrence is the better guess */
+    int slow;     /* how many of the last steps took more than one iteration */
+    int patience; /* how many of those before the recurrence is fitted again */
+    double past[192][nambu_pendulum_DIM]; /* values, the latest last */
+    double weight[32][nambu_pendulum_DIM][1]; /* of past values, the latest first, for the next value */
 } nambu_pendulum_memory;
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with nambu_pendulum_init. */

@@ -13,12 +13,13 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 3db28a2dc5730a8421c42949d8755fed2b288d34cd36ac6255282cc5326c3b21
+ * body-sha256: 773c7c71b91b01e99d4810698ec85c3a30c29a712b757857c7e9f555b812c7fa
  */
 #include "pendulum_euler.h"
 
 #include <float.h>
 #include <math.h>
+#include <stdint.h>
 #include <string.h>
 
 const pendulum_euler_params pendulum_euler_default_params = { 1.0 };
@@ -33,15 +34,18 @@ static void pendulum_euler_prepare(const pendulum_euler_params *params, double h
     coef[1] = h;
 }
 
-/* x + change in compensated arithmetic. 0, and x as before, if the sum is not finite. */
-static int pendulum_euler_advance(pendulum_euler_solver *s, const double change[2])
+/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last
+   bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the
+   sum is not finite. */
+static int pendulum_euler_advance(pendulum_euler_solver *s, const double change[2], const double correction[2])
 {
     double x[2], carry[2];
     for (int i = 0; i < 2; ++i) {
-        const double addend = change[i] + s->carry[i];
-        x[i] = s->x[i] + addend;
-        const double added = x[i] - s->x[i];
-        carry[i] = (s->x[i] - (x[i] - added)) + (addend - added);
+        const double sum = s->x[i] + change[i], added = sum - s->x[i];
+        const double lost = (s->x[i] - (sum - added)) + (change[i] - added);
+        const double small = lost + (s->carry[i] + correction[i]);
+        x[i] = sum + small;
+        carry[i] = small - (x[i] - sum);
         if (!isfinite(x[i])) return 0;
     }
     memcpy(s->x, x, sizeof x);
@@ -62,10 +66,11 @@ static void pendulum_euler_explicit(const double coef[2], const double state[2],
 /* One explicit stage: x + increment(x). */
 static pendulum_euler_status pendulum_euler_attempt(pendulum_euler_solver *s, int stage)
 {
+    const double none[2] = { 0.0 };
     double increment[2];
     pendulum_euler_explicit(s->coef[stage], s->x, increment);
     ++s->evaluations;
-    return pendulum_euler_advance(s, increment) ? pendulum_euler_OK : pendulum_euler_NOT_FINITE;
+    return pendulum_euler_advance(s, increment, none) ? pendulum_euler_OK : pendulum_euler_NOT_FINITE;
 }
 
 /* The 1 stages of one step. A guess from earlier steps may mislead; a stage that fails is tried once more
@@ -77,7 +82,7 @@ static pendulum_euler_status pendulum_euler_stages(pendulum_euler_solver *s)
     memcpy(carry, s->carry, sizeof carry);
     for (int stage = 0; stage < 1; ++stage) {
         pendulum_euler_status status = pendulum_euler_attempt(s, stage);
-        if (status != pendulum_euler_OK && s->memory[stage].rows > 0) {
+        if (status != pendulum_euler_OK && s->memory[stage].count > 0) {
             memset(&s->memory[stage], 0, sizeof s->memory[stage]);
             status = pendulum_euler_attempt(s, stage);
         }

@@ -13,13 +13,12 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: de05c1bb3578cb551fb43494ada0c393b6291f09091ad6ef6acf4a9a126d8b72
+ * body-sha256: af5114e2989232c2f9f5c9bdf71732188982625327c158fdeddf0067c9ffd0eb
  */
 #ifndef PENDULUM_EULER_H
 #define PENDULUM_EULER_H
 
 #include <stddef.h>
-
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -46,19 +45,17 @@ typedef enum {
     pendulum_euler_BAD_ARGUMENT    /* a null pointer, or a value that is not finite */
 } pendulum_euler_status;
 
-/* Recent values of the unknown of the inner solve, for its starting guess. Two predictors compete: extrapolation by
-   backward differences, and a linear recurrence fitted to the last 80 values; they affect speed only. */
+/* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
+   fitted to the last 96 values. They affect speed only. */
 typedef struct {
-    int rows;  /* rows of lag in use */
-    int guess; /* how many of them the extrapolation adds up */
-    int count; /* values in past */
-    int slow;  /* how many of the last steps took more than one iteration */
-    int trained; /* whether weight is set */
-    double lag[8][pendulum_euler_DIM]; /* backward differences, order by order */
-    double past[160][pendulum_euler_DIM];   /* values, the latest last */
-    double weight[16][pendulum_euler_DIM]; /* of past values, the latest first */
-    double predicted[2][pendulum_euler_DIM]; /* what the two predictors say of the next value */
-    double error[2];                     /* their recent errors */
+    int count;    /* values in past */
+    int order;    /* how many of them the extrapolation uses */
+    int fits;     /* how often weight has been fitted */
+    int fitting;  /* whether the recurrence is the better guess */
+    int slow;     /* how many of the last steps took more than one iteration */
+    int patience; /* how many of those before the recurrence is fitted again */
+    double past[192][pendulum_euler_DIM]; /* values, the latest last */
+    double weight[32][pendulum_euler_DIM][1]; /* of past values, the latest first, for the next value */
 } pendulum_euler_memory;
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with pendulum_euler_init. */

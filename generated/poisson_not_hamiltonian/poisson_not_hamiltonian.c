@@ -13,12 +13,13 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: fbe289906e116f6fc5a8f3a842ebf8a066904f62d6330589b201284dcb4f6131
+ * body-sha256: e19d0cc1be13c5f2b6742644d93413361df32b77fd664bdb68c7bc8ec243334b
  */
 #include "poisson_not_hamiltonian.h"
 
 #include <float.h>
 #include <math.h>
+#include <stdint.h>
 #include <string.h>
 
 const poisson_not_hamiltonian_params poisson_not_hamiltonian_default_params = { 0 };
@@ -258,119 +259,128 @@ static int poisson_not_hamiltonian_solve(double matrix[9], double side[3])
     return 1;
 }
 
-/* Keep the backward differences of a vector that varies slowly from step to step (y - x), and choose how
-   many of them to extrapolate with next time: the first difference left out estimates the error of the guess. */
-static void poisson_not_hamiltonian_difference(poisson_not_hamiltonian_memory *memory, const double value[3])
+/* The guess for the next value (y), from earlier ones; 0 if there are none. */
+static int poisson_not_hamiltonian_predict(const poisson_not_hamiltonian_memory *memory, double value[3])
 {
-    double row[3], least = HUGE_VAL;
-    const int rows = memory->rows < 8 ? memory->rows + 1 : 8;
-    memcpy(row, value, sizeof row);
-    for (int k = 0; k < rows; ++k) {
-        double size = 0.0;
-        for (int i = 0; i < 3; ++i) {
-            const double before = k < memory->rows ? memory->lag[k][i] : 0.0;
-            memory->lag[k][i] = row[i];
-            size += fabs(row[i]);
-            row[i] -= before;
+    const int last = memory->count - 1;
+    double odd[3] = { 0.0 }, binomial = -1.0;
+    memset(value, 0, 3 * sizeof value[0]);
+    if (memory->fitting) {
+        for (int k = 0; k < 32; k += 2)
+            for (int i = 0; i < 3; ++i) {
+                value[i] += memory->weight[k][i][0] * memory->past[last - k][i];
+                odd[i] += memory->weight[k + 1][i][0] * memory->past[last - 1 - k][i];
+            }
+        for (int i = 0; i < 3; ++i) value[i] += odd[i];
+    } else {
+        for (int k = 0; k < memory->order && k <= last; ++k) {
+            binomial *= -(double)(memory->order - k) / (k + 1);
+            for (int i = 0; i < 3; ++i) value[i] += binomial * memory->past[last - k][i];
         }
+    }
+    return last >= 0;
+}
+
+/* Choose the guess that would have been best for a value that took several iterations. */
+static void poisson_not_hamiltonian_judge(poisson_not_hamiltonian_memory *memory, const double value[3])
+{
+    double row[8 + 1][3], guess[3], least = HUGE_VAL, fitted = HUGE_VAL;
+    const int rows = memory->count < 8 ? memory->count : 8;
+    memcpy(row[0], value, sizeof row[0]);
+    for (int k = 0; k < rows; ++k) memcpy(row[k + 1], memory->past[memory->count - 1 - k], sizeof row[0]);
+    for (int order = 1; order <= rows; ++order) { /* row[0] becomes the backward difference of this order */
+        double size = 0.0;
+        for (int k = 0; k <= rows - order; ++k)
+            for (int i = 0; i < 3; ++i) row[k][i] -= row[k + 1][i];
+        for (int i = 0; i < 3; ++i) size += fabs(row[0][i]);
         if (size < least) {
             least = size;
-            memory->guess = k;
+            memory->order = order;
         }
     }
-    memory->rows = rows;
-}
-
-/* The guess of the better predictor; zero without a history. Both are kept, to be judged by the solved value. */
-static void poisson_not_hamiltonian_predict(poisson_not_hamiltonian_memory *memory, double value[3])
-{
-    double(*guess)[3] = memory->predicted;
-    memset(memory->predicted, 0, sizeof memory->predicted);
-    for (int k = 0; k < memory->guess; ++k)
-        for (int i = 0; i < 3; ++i) guess[0][i] += memory->lag[k][i];
-    if (memory->trained) {
-        const int last = memory->count - 1;
-        double odd[3] = { 0.0 };
-        for (int k = 0; k < 16; k += 2)
-            for (int i = 0; i < 3; ++i) {
-                guess[1][i] += memory->weight[k][i] * memory->past[last - k][i];
-                odd[i] += memory->weight[k + 1][i] * memory->past[last - 1 - k][i];
-            }
-        for (int i = 0; i < 3; ++i) guess[1][i] += odd[i];
+    memory->fitting = memory->fits > 0;
+    if (memory->fitting && poisson_not_hamiltonian_predict(memory, guess)) {
+        fitted = 0.0;
+        for (int i = 0; i < 3; ++i) fitted += fabs(value[i] - guess[i]);
     }
-    memcpy(value, guess[memory->trained && memory->error[1] <= memory->error[0]], 3 * sizeof value[0]);
+    memory->fitting = memory->fits > 0 && fitted <= least;
+    if (memory->order == 0) memory->order = 1;
 }
 
-/* Fit the recurrence value[m] = sum of weight[k] * value[m - 1 - k] to the history, component by component: ridge
-   least squares by modified Gram-Schmidt, the ridge at the level of rounding. */
+/* Fit the recurrences value[m + l] = sum of weight[k][..][l] * value[m - 1 - k], l = 0 ... 8 - 1, to the history,
+   component by component: ridge least squares by modified Gram-Schmidt, the ridge at the level of rounding. The last
+   8 columns of q are the right-hand sides. */
 static void poisson_not_hamiltonian_train(poisson_not_hamiltonian_memory *memory, int component)
 {
-    enum { ROWS = 80 - 16, ALL = 80 };
-    double q[16][ALL], r[16][16], b[ALL] = { 0.0 }, largest = 0.0;
-    const int first = memory->count - 80;
+    enum { WINDOW = 32, AHEAD = 8, ROWS = 96 - WINDOW - AHEAD + 1 };
+    double q[ROWS + WINDOW][WINDOW + AHEAD], r[WINDOW][WINDOW + AHEAD], largest = 0.0;
     memset(q, 0, sizeof q);
-    for (int i = 0; i < 80; ++i)
-        if (fabs(memory->past[first + i][component]) > largest) largest = fabs(memory->past[first + i][component]);
-    for (int k = 0; k < 16; ++k) {
-        for (int i = 0; i < ROWS; ++i) q[k][i] = memory->past[first + i + 16 - 1 - k][component];
-        q[k][ROWS + k] = 1e-13 * largest;
-    }
-    for (int i = 0; i < ROWS; ++i) b[i] = memory->past[first + i + 16][component];
-    for (int k = 0; k < 16; ++k) {
-        double norm = 0.0, along = 0.0;
-        for (int i = 0; i < ALL; ++i) norm += q[k][i] * q[k][i];
-        r[k][k] = sqrt(norm);
-        for (int i = 0; i < ALL; ++i) q[k][i] = norm > 0.0 ? q[k][i] / r[k][k] : 0.0;
-        for (int j = k + 1; j < 16; ++j) {
-            double dot = 0.0;
-            for (int i = 0; i < ALL; ++i) dot += q[k][i] * q[j][i];
-            r[k][j] = dot;
-            for (int i = 0; i < ALL; ++i) q[j][i] -= dot * q[k][i];
+    memset(r, 0, sizeof r);
+    for (int i = 0; i < ROWS; ++i) {
+        for (int j = 0; j < WINDOW + AHEAD; ++j) {
+            const int place = j < WINDOW ? WINDOW - 1 - j : j;
+            q[i][j] = memory->past[memory->count - 96 + i + place][component];
         }
-        for (int i = 0; i < ALL; ++i) along += q[k][i] * b[i];
-        memory->weight[k][component] = along;
-        for (int i = 0; i < ALL; ++i) b[i] -= along * q[k][i];
+        if (fabs(q[i][0]) > largest) largest = fabs(q[i][0]);
     }
-    for (int k = 16 - 1; k >= 0; --k) {
-        double sum = memory->weight[k][component];
-        for (int j = k + 1; j < 16; ++j) sum -= r[k][j] * memory->weight[j][component];
-        memory->weight[k][component] = r[k][k] > 0.0 ? sum / r[k][k] : 0.0;
+    for (int k = 0; k < WINDOW; ++k) q[ROWS + k][k] = 1e-13 * largest;
+    for (int k = 0; k < WINDOW; ++k) {
+        for (int i = 0; i < ROWS + WINDOW; ++i)
+            for (int j = k; j < WINDOW + AHEAD; ++j) r[k][j] += q[i][k] * q[i][j];
+        const double scale = r[k][k] > 0.0 ? 1.0 / r[k][k] : 0.0;
+        for (int j = k + 1; j < WINDOW + AHEAD; ++j) r[k][j] *= scale;
+        for (int i = 0; i < ROWS + WINDOW; ++i)
+            for (int j = k + 1; j < WINDOW + AHEAD; ++j) q[i][j] -= q[i][k] * r[k][j];
     }
+    for (int l = 0; l < AHEAD; ++l)
+        for (int k = WINDOW - 1; k >= 0; --k) {
+            double sum = r[k][WINDOW + l];
+            for (int j = k + 1; j < WINDOW; ++j) sum -= r[k][j] * memory->weight[j][component][l];
+            memory->weight[k][component][l] = sum;
+        }
 }
 
-/* Take in the solved value: update both predictors and their errors, and fit the recurrence when steps have been
-   taking several iterations. */
-static void poisson_not_hamiltonian_remember(poisson_not_hamiltonian_memory *memory, const double value[3], int iterations)
+/* Add a value to the history. */
+static void poisson_not_hamiltonian_record(poisson_not_hamiltonian_memory *memory, const double value[3])
 {
-    for (int kind = 0; kind < 2; ++kind) {
-        double error = 0.0;
-        for (int i = 0; i < 3; ++i) error += fabs(value[i] - memory->predicted[kind][i]);
-        memory->error[kind] = fmax(0.8 * memory->error[kind], error);
-    }
-    poisson_not_hamiltonian_difference(memory, value);
-    if (memory->count == 160) {
-        memmove(memory->past, memory->past + 160 - 80, 80 * sizeof memory->past[0]);
-        memory->count = 80;
+    if (memory->count == 192) {
+        memmove(memory->past, memory->past + 192 - 96, 96 * sizeof memory->past[0]);
+        memory->count = 96;
     }
     memcpy(memory->past[memory->count++], value, 3 * sizeof value[0]);
-    memory->slow = iterations > 1 ? memory->slow + 1 : 0;
-    if (memory->slow >= 80 && memory->count >= 80) {
-        for (int i = 0; i < 3; ++i) poisson_not_hamiltonian_train(memory, i);
-        memory->trained = 1;
-        memory->error[1] = 0.0;
-        memory->slow = -80;
-    }
 }
 
-/* x + change in compensated arithmetic. 0, and x as before, if the sum is not finite. */
-static int poisson_not_hamiltonian_advance(poisson_not_hamiltonian_solver *s, const double change[3])
+/* Fit the recurrence to the last values; with every time, wait longer before it is done again. */
+static void poisson_not_hamiltonian_fit(poisson_not_hamiltonian_memory *memory)
+{
+    for (int i = 0; i < 3; ++i) poisson_not_hamiltonian_train(memory, i);
+    memory->fitting = 1;
+    ++memory->fits;
+    memory->slow = 0;
+    memory->patience = memory->patience < 10000 ? 2 * memory->patience + 96 : 20000;
+}
+
+/* Take in the solved value: what took one iteration needs no better guess. */
+static void poisson_not_hamiltonian_remember(poisson_not_hamiltonian_memory *memory, const double value[3], int iterations)
+{
+    if (iterations > 1) poisson_not_hamiltonian_judge(memory, value);
+    poisson_not_hamiltonian_record(memory, value);
+    memory->slow = iterations > 1 ? memory->slow + 1 : 0;
+    if (memory->slow > memory->patience && memory->count >= 96) poisson_not_hamiltonian_fit(memory);
+}
+
+/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last
+   bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the
+   sum is not finite. */
+static int poisson_not_hamiltonian_advance(poisson_not_hamiltonian_solver *s, const double change[3], const double correction[3])
 {
     double x[3], carry[3];
     for (int i = 0; i < 3; ++i) {
-        const double addend = change[i] + s->carry[i];
-        x[i] = s->x[i] + addend;
-        const double added = x[i] - s->x[i];
-        carry[i] = (s->x[i] - (x[i] - added)) + (addend - added);
+        const double sum = s->x[i] + change[i], added = sum - s->x[i];
+        const double lost = (s->x[i] - (sum - added)) + (change[i] - added);
+        const double small = lost + (s->carry[i] + correction[i]);
+        x[i] = sum + small;
+        carry[i] = small - (x[i] - sum);
         if (!isfinite(x[i])) return 0;
     }
     memcpy(s->x, x, sizeof x);
@@ -394,20 +404,19 @@ static double poisson_not_hamiltonian_size(const double y[3], const double delta
 
 /* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the extrapolated guess, and advance. The
    increment is corrected to first order by the last Newton correction, so that correction costs no evaluation:
-   a correction is accepted when the error that remains after it, quadratic in it, is below 1e-18. */
+   a correction is accepted when the error that remains after it, quadratic in it, is below 1e-20. */
 static poisson_not_hamiltonian_status poisson_not_hamiltonian_attempt(poisson_not_hamiltonian_solver *s, int stage)
 {
     const double *coef = s->coef[stage];
     poisson_not_hamiltonian_memory *memory = &s->memory[stage];
     double y[3], delta[3], displacement[3], increment[3];
     double jacobian[9], increment_jacobian[9];
-    poisson_not_hamiltonian_predict(memory, y);
-    for (int i = 0; i < 3; ++i) y[i] += s->x[i];
+    if (!poisson_not_hamiltonian_predict(memory, y)) memcpy(y, s->x, sizeof y);
     double previous = HUGE_VAL;
     for (int iteration = 0; iteration < 20; ++iteration) {
         poisson_not_hamiltonian_linearise(coef, y, displacement, increment, jacobian, increment_jacobian);
         ++s->evaluations;
-        for (int i = 0; i < 3; ++i) delta[i] = ((y[i] - s->x[i]) - s->carry[i]) + displacement[i];
+        for (int i = 0; i < 3; ++i) delta[i] = ((y[i] - s->x[i]) + displacement[i]) - s->carry[i];
         const int regular = poisson_not_hamiltonian_solve(jacobian, delta);
         const double size = poisson_not_hamiltonian_size(y, delta);
         if (!isfinite(size)) return poisson_not_hamiltonian_NOT_FINITE;
@@ -416,14 +425,12 @@ static poisson_not_hamiltonian_status poisson_not_hamiltonian_attempt(poisson_no
         const double growth = size / (previous * previous);
         const double remaining = size * size * (growth > 1.0 ? growth : 1.0);
         /* The second test: corrections no longer shrink, the solve has reached the level of rounding. */
-        if (remaining <= 1e-18 || (previous < 1e-8 && size > 0.25 * previous)) {
-            double offset[3];
-            for (int i = 0; i < 3; ++i) {
-                offset[i] = y[i] - s->x[i];
-                for (int j = 0; j < 3; ++j) increment[i] -= increment_jacobian[i * 3 + j] * delta[j];
-            }
-            if (!poisson_not_hamiltonian_advance(s, increment)) return poisson_not_hamiltonian_NOT_FINITE;
-            poisson_not_hamiltonian_remember(memory, offset, iteration + 1);
+        if (remaining <= 1e-20 || (previous < 1e-8 && size > 0.25 * previous)) {
+            double correction[3] = { 0.0 };
+            for (int i = 0; i < 3; ++i)
+                for (int j = 0; j < 3; ++j) correction[i] -= increment_jacobian[i * 3 + j] * delta[j];
+            if (!poisson_not_hamiltonian_advance(s, increment, correction)) return poisson_not_hamiltonian_NOT_FINITE;
+            poisson_not_hamiltonian_remember(memory, y, iteration + 1);
             return poisson_not_hamiltonian_OK;
         }
         previous = size;
@@ -440,7 +447,7 @@ static poisson_not_hamiltonian_status poisson_not_hamiltonian_stages(poisson_not
     memcpy(carry, s->carry, sizeof carry);
     for (int stage = 0; stage < 1; ++stage) {
         poisson_not_hamiltonian_status status = poisson_not_hamiltonian_attempt(s, stage);
-        if (status != poisson_not_hamiltonian_OK && s->memory[stage].rows > 0) {
+        if (status != poisson_not_hamiltonian_OK && s->memory[stage].count > 0) {
             memset(&s->memory[stage], 0, sizeof s->memory[stage]);
             status = poisson_not_hamiltonian_attempt(s, stage);
         }
@@ -481,11 +488,471 @@ poisson_not_hamiltonian_status poisson_not_hamiltonian_step(poisson_not_hamilton
     return status;
 }
 
+/*
+ * Eight at a time: below, the formulas of a step are evaluated for 8 steps of a trajectory, or members of an
+ * ensemble, at once. Compilers make vector instructions of the loops over lanes.
+ */
+enum { poisson_not_hamiltonian_LANES = 8 };
+
+#if defined(__GNUC__)
+typedef double poisson_not_hamiltonian_lanes[poisson_not_hamiltonian_LANES] __attribute__((aligned(64))); /* a value in each lane */
+#else
+typedef double poisson_not_hamiltonian_lanes[poisson_not_hamiltonian_LANES];
+#endif
+
+#if defined(__clang__)
+#define poisson_not_hamiltonian_EACH_LANE _Pragma("clang loop vectorize(assume_safety)")
+#pragma clang diagnostic ignored "-Wpass-failed"
+#elif defined(__GNUC__)
+#define poisson_not_hamiltonian_EACH_LANE _Pragma("GCC ivdep") _Pragma("GCC unroll 1")
+#else
+#define poisson_not_hamiltonian_EACH_LANE
+#endif
+
+/* What all blocks share: coefficients, the same in each lane, and the recurrences by which they are foreseen. */
+typedef struct {
+    int fits[1]; /* the fit that weight is of; -1 for none */
+    poisson_not_hamiltonian_lanes coef[1][2], weight[1][32][3];
+} poisson_not_hamiltonian_table;
+
+/* A stage in all lanes, linear around y: a residual r of alpha(y) = x takes inverse r from y and gain r from the
+   increment. */
+typedef struct {
+    poisson_not_hamiltonian_lanes y[3], displacement[3], increment[3], residual[3];
+    poisson_not_hamiltonian_lanes inverse[9], slope[9], gain[9];
+} poisson_not_hamiltonian_lines;
+
+/* exp(u) for the loops over lanes: u = k log 2 + r, no branches. Infinite beyond |u| = 700.0. */
+static inline double poisson_not_hamiltonian_exp_lane(double u)
+{
+    const double shifted = u * 1.4426950408889634 + 6755399441055744.0, k = shifted - 6755399441055744.0;
+    const double r = (u - k * 0.6931471803691238) - k * 1.9082149292705877e-10;
+    uint64_t bits; /* the last bits of shifted are k */
+    double power, sum = 1.1470745597729725e-11;
+    memcpy(&bits, &shifted, sizeof bits);
+    bits = (bits + 1023) << 52;
+    memcpy(&power, &bits, sizeof power);
+    sum = sum * r + 1.6059043836821613e-10;
+    sum = sum * r + 2.08767569878681e-09;
+    sum = sum * r + 2.505210838544172e-08;
+    sum = sum * r + 2.755731922398589e-07;
+    sum = sum * r + 2.7557319223985893e-06;
+    sum = sum * r + 2.48015873015873e-05;
+    sum = sum * r + 0.0001984126984126984;
+    sum = sum * r + 0.001388888888888889;
+    sum = sum * r + 0.008333333333333333;
+    sum = sum * r + 0.041666666666666664;
+    sum = sum * r + 0.16666666666666666;
+    sum = sum * r + 0.5;
+    sum = sum * r * r + r;
+    return power * sum + power + (fabs(u) <= 700.0 ? 0.0 : HUGE_VAL);
+}
+
+/* poisson_not_hamiltonian_linearise in all lanes. */
+static void poisson_not_hamiltonian_linearise_lanes(poisson_not_hamiltonian_lanes coef[restrict 2],
+                                                    poisson_not_hamiltonian_lanes y[restrict 3],
+                                                    poisson_not_hamiltonian_lanes displacement[restrict 3],
+                                                    poisson_not_hamiltonian_lanes increment[restrict 3],
+                                                    poisson_not_hamiltonian_lanes jacobian[restrict 9],
+                                                    poisson_not_hamiltonian_lanes increment_jacobian[restrict 9])
+{
+    poisson_not_hamiltonian_EACH_LANE
+    for (int lane = 0; lane < poisson_not_hamiltonian_LANES; ++lane) {
+        const double x = y[0][lane];
+        const double y_ = y[1][lane];
+        const double z = y[2][lane];
+        const double t1 = y_ - z;
+        const double p_z = coef[1][lane] * y_ + coef[0][lane] * z;
+        const double p_y = coef[1][lane] * z + coef[0][lane] * y_;
+        const double p_x = coef[0][lane] * x;
+        const double t2 = p_z + (p_y + 2.0 * p_x);
+        const double t3 = t1 * t2;
+        const double t4 = p_y - p_z;
+        const double t5 = x * t4;
+        const double t6 = poisson_not_hamiltonian_exp_lane(0.25 * (t3 - t5));
+        const double t7 = 0.25 * (t1 * t4 + x * t2);
+        const double t8 = cos(t7);
+        const double t9 = x * t8;
+        const double t10 = sin(t7);
+        const double t11 = t1 * t10;
+        const double t12 = t9 - t11;
+        const double t13 = t6 * t12;
+        const double t14 = 0.5 * (y_ + z - x);
+        const double t15 = x + t1;
+        const double t16 = t15 * t8;
+        const double t17 = x - t1;
+        const double t18 = t17 * t10;
+        const double t19 = t16 + t18;
+        const double t20 = t14 + 0.5 * (t6 * t19);
+        const double t21 = t17 * t8;
+        const double t22 = t15 * t10;
+        const double t23 = t21 - t22;
+        const double t24 = t14 + 0.5 * (t6 * t23);
+        const double t25 = poisson_not_hamiltonian_exp_lane(0.25 * (t5 - t3));
+        const double t26 = t9 + t11;
+        const double t27 = t16 - t18;
+        const double t28 = t21 + t22;
+        const double t29 = t1 * t6;
+        const double t30 = x * t10;
+        const double t31 = x * t30;
+        const double t32 = 0.5 * (t1 * t9);
+        const double t33 = 0.5 * (t29 * t12) + t6 * ((-0.5) * t31 - t32);
+        const double t34 = p_z - p_y;
+        const double t35 = t34 * t6;
+        const double t36 = t2 * t10;
+        const double t37 = t8 - 0.25 * (x * t36);
+        const double t38 = t2 * t8;
+        const double t39 = 0.25 * (t1 * t38);
+        const double t40 = 0.25 * (t35 * t12) + t6 * (t37 - t39);
+        const double t41 = t2 * t6;
+        const double t42 = 0.25 * (t41 * t12);
+        const double t43 = t4 * t10;
+        const double t44 = x * t43;
+        const double t45 = t4 * t8;
+        const double t46 = t10 + 0.25 * (t1 * t45);
+        const double t47 = t42 + t6 * ((-0.25) * t44 - t46);
+        const double t48 = (t1 - x) * t6;
+        const double t49 = x * t22;
+        const double t50 = 0.25 * (t1 * t16);
+        const double t51 = 0.25 * (t48 * t12) + t6 * ((-0.25) * t49 - t50);
+        const double t52 = t15 * t6;
+        const double t53 = z - y_;
+        const double t54 = x + t53;
+        const double t55 = t54 * t10;
+        const double t56 = x * t55;
+        const double t57 = t54 * t8;
+        const double t58 = 0.25 * (t1 * t57);
+        const double t59 = 0.25 * (t52 * t12) + t6 * ((-0.25) * t56 - t58);
+        const double t60 = t34 * t8;
+        const double t61 = 0.25 * (t1 * t60);
+        const double t62 = t34 * t10;
+        const double t63 = 0.25 * (x * t62);
+        const double t64 = t6 * (t10 - t61 - t63);
+        const double t65 = 0.5 * (t17 * t9);
+        const double t66 = t15 * t30;
+        const double t67 = 0.5 * (t29 * t19) + t6 * (t65 - 0.5 * t66);
+        const double t68 = t8 - 0.25 * (t15 * t36);
+        const double t69 = t10 + 0.25 * (t17 * t38);
+        const double t70 = -0.5 + 0.5 * (0.25 * (t35 * t19) + t6 * (t68 + t69));
+        const double t71 = 0.25 * (t17 * t16);
+        const double t72 = t15 * t22;
+        const double t73 = 0.25 * (t48 * t19) + t6 * (t71 - 0.25 * t72);
+        const double t74 = 0.25 * (t17 * t57);
+        const double t75 = t15 * t55;
+        const double t76 = 0.25 * (t52 * t19) + t6 * (t74 - 0.25 * t75);
+        const double t77 = 0.25 * (t41 * t19);
+        const double t78 = t8 - 0.25 * (t15 * t43);
+        const double t79 = 0.25 * (t17 * t45);
+        const double t80 = 0.5 + 0.5 * (t77 + t6 * (t78 + (t79 - t10)));
+        const double t81 = (-0.25) * (t15 * t62) - t8;
+        const double t82 = t10 + 0.25 * (t17 * t60);
+        const double t83 = 0.5 + 0.5 * (t6 * (t81 + t82) - t77);
+        const double t84 = t17 * t30;
+        const double t85 = 0.5 * (t15 * t9);
+        const double t86 = 0.5 * (t29 * t23) + t6 * ((-0.5) * t84 - t85);
+        const double t87 = t8 - 0.25 * (t17 * t36);
+        const double t88 = t10 + 0.25 * (t15 * t38);
+        const double t89 = -0.5 + 0.5 * (0.25 * (t35 * t23) + t6 * (t87 - t88));
+        const double t90 = 0.25 * (t41 * t23);
+        const double t91 = (-0.25) * (t17 * t43) - t8;
+        const double t92 = t10 + 0.25 * (t15 * t45);
+        const double t93 = 0.5 + 0.5 * (t90 + t6 * (t91 - t92));
+        const double t94 = t17 * t22;
+        const double t95 = 0.25 * (t15 * t16);
+        const double t96 = 0.25 * (t48 * t23) + t6 * ((-0.25) * t94 - t95);
+        const double t97 = t17 * t55;
+        const double t98 = 0.25 * (t15 * t57);
+        const double t99 = 0.25 * (t52 * t23) + t6 * ((-0.25) * t97 - t98);
+        const double t100 = t8 - 0.25 * (t17 * t62);
+        const double t101 = 0.25 * (t15 * t60);
+        const double t102 = 0.5 + 0.5 * (t6 * (t100 + (t10 - t101)) - t90);
+        const double t103 = t1 * t25;
+        const double t104 = t4 * t25;
+        const double t105 = coef[0][lane] * (t25 * (t32 - 0.5 * t31) - 0.5 * (t103 * t26) - t33) + (0.25 * (t104 * t26) + t25 * (t39 + t37) - t40);
+        const double t106 = t2 * t25;
+        const double t107 = 0.25 * (t106 * t26);
+        const double t108 = (t53 - x) * t25;
+        const double t109 = 0.25 * (t108 * t26) + t25 * (t58 - 0.25 * t56) - t59;
+        const double t110 = t54 * t25;
+        const double t111 = 0.25 * (t110 * t26) + t25 * (t50 - 0.25 * t49) - t51;
+        const double t112 = coef[0][lane] * (0.5 * (t25 * ((-0.5) * t66 - t65) - 0.5 * (t103 * t27)) - 0.5 * t67) + (-0.5 + 0.5 * (0.25 * (t104 * t27) + t25 * (t68 - t69)) - t70);
+        const double t113 = 0.5 * (0.25 * (t108 * t27) + t25 * ((-0.25) * t75 - t74)) - 0.5 * t76;
+        const double t114 = 0.5 * (0.25 * (t110 * t27) + t25 * ((-0.25) * t72 - t71)) - 0.5 * t73;
+        const double t115 = 0.25 * (t106 * t27);
+        const double t116 = coef[0][lane] * (0.5 * (t25 * (t85 - 0.5 * t84) - 0.5 * (t103 * t28)) - 0.5 * t86) + (-0.5 + 0.5 * (0.25 * (t104 * t28) + t25 * (t87 + t88)) - t89);
+        const double t117 = 0.5 * (0.25 * (t110 * t28) + t25 * (t95 - 0.25 * t94)) - 0.5 * t96;
+        const double t118 = 0.5 * (0.25 * (t108 * t28) + t25 * (t98 - 0.25 * t97)) - 0.5 * t99;
+        const double t119 = 0.25 * (t106 * t28);
+        displacement[0][lane] = t13 - x;
+        displacement[1][lane] = t20 - y_;
+        displacement[2][lane] = t24 - z;
+        increment[0][lane] = t25 * t26 - t13;
+        increment[1][lane] = t14 + 0.5 * (t25 * t27) - t20;
+        increment[2][lane] = t14 + 0.5 * (t25 * t28) - t24;
+        jacobian[0][lane] = 1.0 + (coef[0][lane] * t33 + (-1.0 + t40));
+        jacobian[1][lane] = t47 + (coef[0][lane] * t51 + coef[1][lane] * t59);
+        jacobian[2][lane] = t64 - t42 + (coef[1][lane] * t51 + coef[0][lane] * t59);
+        jacobian[3][lane] = 0.5 * (coef[0][lane] * t67) + t70;
+        jacobian[4][lane] = 1.0 + (0.5 * (coef[0][lane] * t73) + 0.5 * (coef[1][lane] * t76) + (-1.0 + t80));
+        jacobian[5][lane] = 0.5 * (coef[0][lane] * t76) + 0.5 * (coef[1][lane] * t73) + t83;
+        jacobian[6][lane] = 0.5 * (coef[0][lane] * t86) + t89;
+        jacobian[7][lane] = t93 + (0.5 * (coef[0][lane] * t96) + 0.5 * (coef[1][lane] * t99));
+        jacobian[8][lane] = 1.0 + (0.5 * (coef[0][lane] * t99) + 0.5 * (coef[1][lane] * t96) + (-1.0 + t102));
+        increment_jacobian[0][lane] = t105;
+        increment_jacobian[1][lane] = t25 * (t46 - 0.25 * t44) - t107 - t47 + (coef[1][lane] * t109 + coef[0][lane] * t111);
+        increment_jacobian[2][lane] = t107 + t25 * (t61 - t10 - t63) + (t42 - t64) + (coef[0][lane] * t109 + coef[1][lane] * t111);
+        increment_jacobian[3][lane] = t112;
+        increment_jacobian[4][lane] = coef[1][lane] * t113 + coef[0][lane] * t114 + (0.5 + 0.5 * (t25 * (t78 + (t10 - t79)) - t115) - t80);
+        increment_jacobian[5][lane] = coef[1][lane] * t114 + coef[0][lane] * t113 + (0.5 + 0.5 * (t115 + t25 * (t81 - t82)) - t83);
+        increment_jacobian[6][lane] = t116;
+        increment_jacobian[7][lane] = coef[0][lane] * t117 + coef[1][lane] * t118 + (0.5 + 0.5 * (t25 * (t92 + t91) - t119) - t93);
+        increment_jacobian[8][lane] = 0.5 + 0.5 * (t119 + t25 * (t101 - t10 + t100)) - t102 + (coef[1][lane] * t117 + coef[0][lane] * t118);
+    }
+}
+
+/* poisson_not_hamiltonian_invert in all lanes. */
+static void poisson_not_hamiltonian_invert_lanes(poisson_not_hamiltonian_lanes matrix[restrict 9],
+                                                 poisson_not_hamiltonian_lanes slope[restrict 9],
+                                                 poisson_not_hamiltonian_lanes inverse[restrict 9],
+                                                 poisson_not_hamiltonian_lanes gain[restrict 9],
+                                                 poisson_not_hamiltonian_lanes reciprocal[restrict 3])
+{
+    poisson_not_hamiltonian_EACH_LANE
+    for (int lane = 0; lane < poisson_not_hamiltonian_LANES; ++lane) {
+        const double t1 = 1.0 / matrix[0][lane];
+        const double t2 = matrix[1][lane] * t1;
+        const double t3 = 1.0 / (matrix[4][lane] - matrix[3][lane] * t2);
+        const double t4 = matrix[3][lane] * t1 * t3;
+        const double t5 = matrix[2][lane] * t1;
+        const double t6 = (matrix[5][lane] - matrix[3][lane] * t5) * t3;
+        const double t7 = t5 - t2 * t6;
+        const double t8 = matrix[7][lane] - matrix[6][lane] * t2;
+        const double t9 = 1.0 / (matrix[8][lane] - matrix[6][lane] * t5 - t8 * t6);
+        const double t10 = (t8 * t4 - matrix[6][lane] * t1) * t9;
+        const double t11 = t1 + t2 * t4 - t7 * t10;
+        const double t12 = t8 * t3 * t9;
+        const double t13 = t7 * t12 - t2 * t3;
+        const double t14 = t7 * t9;
+        const double t15 = t4 + t6 * t10;
+        const double t16 = t3 + t6 * t12;
+        const double t17 = t6 * t9;
+        inverse[0][lane] = t11;
+        inverse[1][lane] = t13;
+        inverse[2][lane] = -t14;
+        inverse[3][lane] = -t15;
+        inverse[4][lane] = t16;
+        inverse[5][lane] = -t17;
+        inverse[6][lane] = t10;
+        inverse[7][lane] = -t12;
+        inverse[8][lane] = t9;
+        gain[0][lane] = slope[2][lane] * t10 + (slope[0][lane] * t11 - slope[1][lane] * t15);
+        gain[1][lane] = slope[0][lane] * t13 + slope[1][lane] * t16 - slope[2][lane] * t12;
+        gain[2][lane] = slope[2][lane] * t9 - (slope[0][lane] * t14 + slope[1][lane] * t17);
+        gain[3][lane] = slope[5][lane] * t10 + (slope[3][lane] * t11 - slope[4][lane] * t15);
+        gain[4][lane] = slope[3][lane] * t13 + slope[4][lane] * t16 - slope[5][lane] * t12;
+        gain[5][lane] = slope[5][lane] * t9 - (slope[4][lane] * t17 + slope[3][lane] * t14);
+        gain[6][lane] = slope[8][lane] * t10 + (slope[6][lane] * t11 - slope[7][lane] * t15);
+        gain[7][lane] = slope[6][lane] * t13 + slope[7][lane] * t16 - slope[8][lane] * t12;
+        gain[8][lane] = slope[8][lane] * t9 - (slope[6][lane] * t14 + slope[7][lane] * t17);
+        reciprocal[0][lane] = t1;
+        reciprocal[1][lane] = t3;
+        reciprocal[2][lane] = t9;
+    }
+}
+
+/* Everything about a stage at the points y. The matrices are I + O(h): where a pivot is far from 1, all is infinite. */
+static void poisson_not_hamiltonian_tabulate(poisson_not_hamiltonian_lanes coef[restrict], poisson_not_hamiltonian_lines *line)
+{
+    poisson_not_hamiltonian_lanes jacobian[9], reciprocal[3];
+    poisson_not_hamiltonian_linearise_lanes(coef, line->y, line->displacement, line->increment, jacobian, line->slope);
+    poisson_not_hamiltonian_invert_lanes(jacobian, line->slope, line->inverse, line->gain, reciprocal);
+    for (int i = 0; i < 3; ++i) {
+        poisson_not_hamiltonian_EACH_LANE
+        for (int lane = 0; lane < poisson_not_hamiltonian_LANES; ++lane)
+            line->inverse[i][lane] += fabs(reciprocal[i][lane]) < 1e3 ? 0.0 : HUGE_VAL;
+    }
+}
+
+/* poisson_not_hamiltonian_size in all lanes, summed over the components. */
+static void poisson_not_hamiltonian_sizes(poisson_not_hamiltonian_lanes y[restrict 3], poisson_not_hamiltonian_lanes delta[restrict 3],
+    poisson_not_hamiltonian_lanes size)
+{
+    poisson_not_hamiltonian_lanes norm = { 0.0 };
+    memset(size, 0, poisson_not_hamiltonian_LANES * sizeof size[0]);
+    for (int i = 0; i < 3; ++i)
+        for (int lane = 0; lane < poisson_not_hamiltonian_LANES; ++lane)
+            norm[lane] = 1e-6 * fabs(y[i][lane]) > norm[lane] ? 1e-6 * fabs(y[i][lane]) : norm[lane];
+    for (int i = 0; i < 3; ++i) {
+        poisson_not_hamiltonian_EACH_LANE
+        for (int lane = 0; lane < poisson_not_hamiltonian_LANES; ++lane)
+            size[lane] += fabs(delta[i][lane]) / (fabs(y[i][lane]) + norm[lane] + DBL_MIN);
+    }
+}
+
+/* The steps of a block one after the other, each along the lines of its lane. As X, the state with its carry, gains
+   increment - gain residual, the next residual follows from this one; X itself is added up apart. */
+static void poisson_not_hamiltonian_chain(poisson_not_hamiltonian_lines line[1], double x[3], double carry[3])
+{
+    double residual[3], sum[3], small[3];
+    for (int i = 0; i < 3; ++i) {
+        residual[i] = ((line->y[i][0] - x[i]) + line->displacement[i][0]) - carry[i];
+        sum[i] = x[i];
+        small[i] = carry[i];
+    }
+    for (int k = 0; k < 1 * poisson_not_hamiltonian_LANES; ++k) {
+        const int lane = k / 1, after = (k + 1) / 1 % poisson_not_hamiltonian_LANES;
+        poisson_not_hamiltonian_lines *at = &line[k % 1], *next = &line[(k + 1) % 1];
+        double correction[3] = { 0.0 };
+        for (int i = 0; i < 3; ++i) {
+            at->residual[i][lane] = residual[i];
+            for (int j = 0; j < 3; ++j) correction[i] -= at->gain[i * 3 + j][lane] * residual[j];
+        }
+        for (int i = 0; i < 3; ++i) {
+            const double change = at->increment[i][lane], total = sum[i] + change, added = total - sum[i];
+            const double turn = (next->displacement[i][after] - at->displacement[i][lane]) - change;
+            residual[i] = ((next->y[i][after] - at->y[i][lane]) + turn) + (residual[i] - correction[i]);
+            small[i] += ((sum[i] - (total - added)) + (change - added)) + correction[i];
+            sum[i] = total;
+        }
+    }
+    for (int i = 0; i < 3; ++i) {
+        x[i] = sum[i] + small[i];
+        carry[i] = small[i] - (x[i] - sum[i]);
+    }
+}
+
+/* Bring the table up to date. */
+static void poisson_not_hamiltonian_tell(const poisson_not_hamiltonian_solver *s, poisson_not_hamiltonian_table *table)
+{
+    for (int stage = 0; stage < 1; ++stage) {
+        if (table->fits[stage] == s->memory[stage].fits) continue;
+        table->fits[stage] = s->memory[stage].fits;
+        for (int k = 0; k < 2; ++k)
+            for (int lane = 0; lane < poisson_not_hamiltonian_LANES; ++lane) table->coef[stage][k][lane] = s->coef[stage][k];
+        memcpy(table->weight[stage], s->memory[stage].weight, sizeof table->weight[stage]);
+    }
+}
+
+/* The guesses for the next poisson_not_hamiltonian_LANES values. */
+static void poisson_not_hamiltonian_foresee(const poisson_not_hamiltonian_memory *memory, poisson_not_hamiltonian_lanes weight[restrict][3],
+    poisson_not_hamiltonian_lanes y[restrict 3])
+{
+    const int last = memory->count - 1;
+    for (int i = 0; i < 3; ++i) {
+        poisson_not_hamiltonian_EACH_LANE
+        for (int lane = 0; lane < poisson_not_hamiltonian_LANES; ++lane) {
+            double even = 0.0, odd = 0.0;
+            for (int k = 0; k < 32; k += 2) {
+                even += weight[k][i][lane] * memory->past[last - k][i];
+                odd += weight[k + 1][i][lane] * memory->past[last - 1 - k][i];
+            }
+            y[i][lane] = even + odd;
+        }
+    }
+}
+
+/* Correct y by the residuals that the chain found. The largest size of a correction; infinite if one is not finite. */
+static double poisson_not_hamiltonian_correct(poisson_not_hamiltonian_lines *line)
+{
+    poisson_not_hamiltonian_lanes size, delta[3];
+    double largest = 0.0, total = 0.0;
+    memset(delta, 0, sizeof delta);
+    for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j) {
+            poisson_not_hamiltonian_EACH_LANE
+            for (int lane = 0; lane < poisson_not_hamiltonian_LANES; ++lane)
+                delta[i][lane] += line->inverse[i * 3 + j][lane] * line->residual[j][lane];
+        }
+    poisson_not_hamiltonian_sizes(line->y, delta, size);
+    for (int i = 0; i < 3; ++i)
+        for (int lane = 0; lane < poisson_not_hamiltonian_LANES; ++lane) line->y[i][lane] -= delta[i][lane];
+    for (int lane = 0; lane < poisson_not_hamiltonian_LANES; ++lane) {
+        total += size[lane];
+        largest = size[lane] > largest ? size[lane] : largest;
+    }
+    return isfinite(total) ? largest : HUGE_VAL;
+}
+
+/* poisson_not_hamiltonian_LANES steps at once: guess the points of all, and correct them together until the error that remains is as
+   small as after a single step. 0, and the solver as before, where that does not come about. */
+static int poisson_not_hamiltonian_block(poisson_not_hamiltonian_solver *s, poisson_not_hamiltonian_table *table)
+{
+    poisson_not_hamiltonian_lines line[1];
+    double x[3], carry[3], value[3], previous = HUGE_VAL;
+    int passes = 0, solved = 0;
+    for (int stage = 0; stage < 1; ++stage)
+        poisson_not_hamiltonian_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
+    while (!solved) {
+        double size = 0.0;
+        for (int stage = 0; stage < 1; ++stage) poisson_not_hamiltonian_tabulate(table->coef[stage], &line[stage]);
+        memcpy(x, s->x, sizeof x);
+        memcpy(carry, s->carry, sizeof carry);
+        poisson_not_hamiltonian_chain(line, x, carry);
+        for (int stage = 0; stage < 1; ++stage) size = fmax(size, poisson_not_hamiltonian_correct(&line[stage]));
+        s->evaluations += 1 * poisson_not_hamiltonian_LANES;
+        const double growth = size / (previous * previous);
+        /* The second test: after the square of so small a correction there is rounding only. */
+        solved = size * size * (growth > 1.0 ? growth : 1.0) <= 1e-20 || (previous < 1e-8 && size < 1e-10);
+        if (++passes == 4 || !(size < previous)) break;
+        previous = size;
+    }
+    for (int i = 0; i < 3; ++i)
+        if (!isfinite(x[i])) return 0;
+    if (!solved) return 0;
+    memcpy(s->x, x, sizeof x);
+    memcpy(s->carry, carry, sizeof carry);
+    s->steps += poisson_not_hamiltonian_LANES;
+    for (int stage = 0; stage < 1; ++stage) {
+        poisson_not_hamiltonian_memory *memory = &s->memory[stage];
+        for (int lane = 0; lane < poisson_not_hamiltonian_LANES; ++lane) {
+            for (int i = 0; i < 3; ++i) value[i] = line[stage].y[i][lane];
+            poisson_not_hamiltonian_record(memory, value);
+        }
+        memory->slow = passes > 1 ? memory->slow + poisson_not_hamiltonian_LANES : 0;
+        if (memory->slow > memory->patience) poisson_not_hamiltonian_fit(memory);
+    }
+    return 1;
+}
+
+/* Whether a block may be tried: not before there are recurrences to guess with, and not for a while after one that
+   failed. They take a thousand steps to repay. */
+static int poisson_not_hamiltonian_may_block(poisson_not_hamiltonian_solver *s, double h, size_t steps)
+{
+    int fit = s->setback > 0 && s->steps - s->fitted >= 1000;
+    if (!s->ready || memcmp(&h, &s->h, sizeof h) != 0 || steps < poisson_not_hamiltonian_LANES) return 0;
+    if (s->pause > 0) {
+        --s->pause;
+        return 0;
+    }
+    for (int stage = 0; stage < 1; ++stage) {
+        fit = fit || s->memory[stage].fits == 0;
+        if (s->memory[stage].count < 96) return 0;
+    }
+    if (fit && steps < 1000) return 0;
+    for (int stage = 0; stage < 1 && fit; ++stage) poisson_not_hamiltonian_fit(&s->memory[stage]);
+    if (fit) s->fitted = s->steps;
+    return 1;
+}
+
+/* Blocks of steps where the motion can be foreseen, single steps elsewhere: the results differ by round-off only. */
 poisson_not_hamiltonian_status poisson_not_hamiltonian_integrate(poisson_not_hamiltonian_solver *s, double h, size_t steps)
 {
-    for (size_t k = 0; k < steps; ++k) {
+    poisson_not_hamiltonian_table table;
+    for (int stage = 0; stage < 1; ++stage) table.fits[stage] = -1;
+    while (steps > 0) {
+        if (s != NULL && poisson_not_hamiltonian_may_block(s, h, steps)) {
+            poisson_not_hamiltonian_tell(s, &table);
+            if (poisson_not_hamiltonian_block(s, &table)) {
+                steps -= poisson_not_hamiltonian_LANES;
+                s->setback /= 2;
+                continue;
+            }
+            s->setback = 2 * s->setback + poisson_not_hamiltonian_LANES > 1000 ? 1000 : 2 * s->setback + poisson_not_hamiltonian_LANES;
+            s->pause = s->setback;
+        }
         const poisson_not_hamiltonian_status status = poisson_not_hamiltonian_step(s, h);
         if (status != poisson_not_hamiltonian_OK) return status;
+        --steps;
     }
     return poisson_not_hamiltonian_OK;
 }

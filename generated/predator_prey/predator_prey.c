@@ -13,12 +13,13 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 74eb1275916c7bc1272515e80ac151fef8297c421f0f0ef65f252b12323d1890
+ * body-sha256: 66a448c3e235b8ba5987642c1382e71504c1e0c5ddafdbb6072d9f0ef6c470f4
  */
 #include "predator_prey.h"
 
 #include <float.h>
 #include <math.h>
+#include <stdint.h>
 #include <string.h>
 
 const predator_prey_params predator_prey_default_params = { 1.0, 0.1, 0.05, 0.5 };
@@ -156,119 +157,128 @@ static int predator_prey_solve(double matrix[4], double side[2])
     return 1;
 }
 
-/* Keep the backward differences of a vector that varies slowly from step to step (y - x), and choose how
-   many of them to extrapolate with next time: the first difference left out estimates the error of the guess. */
-static void predator_prey_difference(predator_prey_memory *memory, const double value[2])
+/* The guess for the next value (y), from earlier ones; 0 if there are none. */
+static int predator_prey_predict(const predator_prey_memory *memory, double value[2])
 {
-    double row[2], least = HUGE_VAL;
-    const int rows = memory->rows < 8 ? memory->rows + 1 : 8;
-    memcpy(row, value, sizeof row);
-    for (int k = 0; k < rows; ++k) {
-        double size = 0.0;
-        for (int i = 0; i < 2; ++i) {
-            const double before = k < memory->rows ? memory->lag[k][i] : 0.0;
-            memory->lag[k][i] = row[i];
-            size += fabs(row[i]);
-            row[i] -= before;
+    const int last = memory->count - 1;
+    double odd[2] = { 0.0 }, binomial = -1.0;
+    memset(value, 0, 2 * sizeof value[0]);
+    if (memory->fitting) {
+        for (int k = 0; k < 32; k += 2)
+            for (int i = 0; i < 2; ++i) {
+                value[i] += memory->weight[k][i][0] * memory->past[last - k][i];
+                odd[i] += memory->weight[k + 1][i][0] * memory->past[last - 1 - k][i];
+            }
+        for (int i = 0; i < 2; ++i) value[i] += odd[i];
+    } else {
+        for (int k = 0; k < memory->order && k <= last; ++k) {
+            binomial *= -(double)(memory->order - k) / (k + 1);
+            for (int i = 0; i < 2; ++i) value[i] += binomial * memory->past[last - k][i];
         }
+    }
+    return last >= 0;
+}
+
+/* Choose the guess that would have been best for a value that took several iterations. */
+static void predator_prey_judge(predator_prey_memory *memory, const double value[2])
+{
+    double row[8 + 1][2], guess[2], least = HUGE_VAL, fitted = HUGE_VAL;
+    const int rows = memory->count < 8 ? memory->count : 8;
+    memcpy(row[0], value, sizeof row[0]);
+    for (int k = 0; k < rows; ++k) memcpy(row[k + 1], memory->past[memory->count - 1 - k], sizeof row[0]);
+    for (int order = 1; order <= rows; ++order) { /* row[0] becomes the backward difference of this order */
+        double size = 0.0;
+        for (int k = 0; k <= rows - order; ++k)
+            for (int i = 0; i < 2; ++i) row[k][i] -= row[k + 1][i];
+        for (int i = 0; i < 2; ++i) size += fabs(row[0][i]);
         if (size < least) {
             least = size;
-            memory->guess = k;
+            memory->order = order;
         }
     }
-    memory->rows = rows;
-}
-
-/* The guess of the better predictor; zero without a history. Both are kept, to be judged by the solved value. */
-static void predator_prey_predict(predator_prey_memory *memory, double value[2])
-{
-    double(*guess)[2] = memory->predicted;
-    memset(memory->predicted, 0, sizeof memory->predicted);
-    for (int k = 0; k < memory->guess; ++k)
-        for (int i = 0; i < 2; ++i) guess[0][i] += memory->lag[k][i];
-    if (memory->trained) {
-        const int last = memory->count - 1;
-        double odd[2] = { 0.0 };
-        for (int k = 0; k < 16; k += 2)
-            for (int i = 0; i < 2; ++i) {
-                guess[1][i] += memory->weight[k][i] * memory->past[last - k][i];
-                odd[i] += memory->weight[k + 1][i] * memory->past[last - 1 - k][i];
-            }
-        for (int i = 0; i < 2; ++i) guess[1][i] += odd[i];
+    memory->fitting = memory->fits > 0;
+    if (memory->fitting && predator_prey_predict(memory, guess)) {
+        fitted = 0.0;
+        for (int i = 0; i < 2; ++i) fitted += fabs(value[i] - guess[i]);
     }
-    memcpy(value, guess[memory->trained && memory->error[1] <= memory->error[0]], 2 * sizeof value[0]);
+    memory->fitting = memory->fits > 0 && fitted <= least;
+    if (memory->order == 0) memory->order = 1;
 }
 
-/* Fit the recurrence value[m] = sum of weight[k] * value[m - 1 - k] to the history, component by component: ridge
-   least squares by modified Gram-Schmidt, the ridge at the level of rounding. */
+/* Fit the recurrences value[m + l] = sum of weight[k][..][l] * value[m - 1 - k], l = 0 ... 8 - 1, to the history,
+   component by component: ridge least squares by modified Gram-Schmidt, the ridge at the level of rounding. The last
+   8 columns of q are the right-hand sides. */
 static void predator_prey_train(predator_prey_memory *memory, int component)
 {
-    enum { ROWS = 80 - 16, ALL = 80 };
-    double q[16][ALL], r[16][16], b[ALL] = { 0.0 }, largest = 0.0;
-    const int first = memory->count - 80;
+    enum { WINDOW = 32, AHEAD = 8, ROWS = 96 - WINDOW - AHEAD + 1 };
+    double q[ROWS + WINDOW][WINDOW + AHEAD], r[WINDOW][WINDOW + AHEAD], largest = 0.0;
     memset(q, 0, sizeof q);
-    for (int i = 0; i < 80; ++i)
-        if (fabs(memory->past[first + i][component]) > largest) largest = fabs(memory->past[first + i][component]);
-    for (int k = 0; k < 16; ++k) {
-        for (int i = 0; i < ROWS; ++i) q[k][i] = memory->past[first + i + 16 - 1 - k][component];
-        q[k][ROWS + k] = 1e-13 * largest;
-    }
-    for (int i = 0; i < ROWS; ++i) b[i] = memory->past[first + i + 16][component];
-    for (int k = 0; k < 16; ++k) {
-        double norm = 0.0, along = 0.0;
-        for (int i = 0; i < ALL; ++i) norm += q[k][i] * q[k][i];
-        r[k][k] = sqrt(norm);
-        for (int i = 0; i < ALL; ++i) q[k][i] = norm > 0.0 ? q[k][i] / r[k][k] : 0.0;
-        for (int j = k + 1; j < 16; ++j) {
-            double dot = 0.0;
-            for (int i = 0; i < ALL; ++i) dot += q[k][i] * q[j][i];
-            r[k][j] = dot;
-            for (int i = 0; i < ALL; ++i) q[j][i] -= dot * q[k][i];
+    memset(r, 0, sizeof r);
+    for (int i = 0; i < ROWS; ++i) {
+        for (int j = 0; j < WINDOW + AHEAD; ++j) {
+            const int place = j < WINDOW ? WINDOW - 1 - j : j;
+            q[i][j] = memory->past[memory->count - 96 + i + place][component];
         }
-        for (int i = 0; i < ALL; ++i) along += q[k][i] * b[i];
-        memory->weight[k][component] = along;
-        for (int i = 0; i < ALL; ++i) b[i] -= along * q[k][i];
+        if (fabs(q[i][0]) > largest) largest = fabs(q[i][0]);
     }
-    for (int k = 16 - 1; k >= 0; --k) {
-        double sum = memory->weight[k][component];
-        for (int j = k + 1; j < 16; ++j) sum -= r[k][j] * memory->weight[j][component];
-        memory->weight[k][component] = r[k][k] > 0.0 ? sum / r[k][k] : 0.0;
+    for (int k = 0; k < WINDOW; ++k) q[ROWS + k][k] = 1e-13 * largest;
+    for (int k = 0; k < WINDOW; ++k) {
+        for (int i = 0; i < ROWS + WINDOW; ++i)
+            for (int j = k; j < WINDOW + AHEAD; ++j) r[k][j] += q[i][k] * q[i][j];
+        const double scale = r[k][k] > 0.0 ? 1.0 / r[k][k] : 0.0;
+        for (int j = k + 1; j < WINDOW + AHEAD; ++j) r[k][j] *= scale;
+        for (int i = 0; i < ROWS + WINDOW; ++i)
+            for (int j = k + 1; j < WINDOW + AHEAD; ++j) q[i][j] -= q[i][k] * r[k][j];
     }
+    for (int l = 0; l < AHEAD; ++l)
+        for (int k = WINDOW - 1; k >= 0; --k) {
+            double sum = r[k][WINDOW + l];
+            for (int j = k + 1; j < WINDOW; ++j) sum -= r[k][j] * memory->weight[j][component][l];
+            memory->weight[k][component][l] = sum;
+        }
 }
 
-/* Take in the solved value: update both predictors and their errors, and fit the recurrence when steps have been
-   taking several iterations. */
-static void predator_prey_remember(predator_prey_memory *memory, const double value[2], int iterations)
+/* Add a value to the history. */
+static void predator_prey_record(predator_prey_memory *memory, const double value[2])
 {
-    for (int kind = 0; kind < 2; ++kind) {
-        double error = 0.0;
-        for (int i = 0; i < 2; ++i) error += fabs(value[i] - memory->predicted[kind][i]);
-        memory->error[kind] = fmax(0.8 * memory->error[kind], error);
-    }
-    predator_prey_difference(memory, value);
-    if (memory->count == 160) {
-        memmove(memory->past, memory->past + 160 - 80, 80 * sizeof memory->past[0]);
-        memory->count = 80;
+    if (memory->count == 192) {
+        memmove(memory->past, memory->past + 192 - 96, 96 * sizeof memory->past[0]);
+        memory->count = 96;
     }
     memcpy(memory->past[memory->count++], value, 2 * sizeof value[0]);
-    memory->slow = iterations > 1 ? memory->slow + 1 : 0;
-    if (memory->slow >= 80 && memory->count >= 80) {
-        for (int i = 0; i < 2; ++i) predator_prey_train(memory, i);
-        memory->trained = 1;
-        memory->error[1] = 0.0;
-        memory->slow = -80;
-    }
 }
 
-/* x + change in compensated arithmetic. 0, and x as before, if the sum is not finite. */
-static int predator_prey_advance(predator_prey_solver *s, const double change[2])
+/* Fit the recurrence to the last values; with every time, wait longer before it is done again. */
+static void predator_prey_fit(predator_prey_memory *memory)
+{
+    for (int i = 0; i < 2; ++i) predator_prey_train(memory, i);
+    memory->fitting = 1;
+    ++memory->fits;
+    memory->slow = 0;
+    memory->patience = memory->patience < 10000 ? 2 * memory->patience + 96 : 20000;
+}
+
+/* Take in the solved value: what took one iteration needs no better guess. */
+static void predator_prey_remember(predator_prey_memory *memory, const double value[2], int iterations)
+{
+    if (iterations > 1) predator_prey_judge(memory, value);
+    predator_prey_record(memory, value);
+    memory->slow = iterations > 1 ? memory->slow + 1 : 0;
+    if (memory->slow > memory->patience && memory->count >= 96) predator_prey_fit(memory);
+}
+
+/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last
+   bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the
+   sum is not finite. */
+static int predator_prey_advance(predator_prey_solver *s, const double change[2], const double correction[2])
 {
     double x[2], carry[2];
     for (int i = 0; i < 2; ++i) {
-        const double addend = change[i] + s->carry[i];
-        x[i] = s->x[i] + addend;
-        const double added = x[i] - s->x[i];
-        carry[i] = (s->x[i] - (x[i] - added)) + (addend - added);
+        const double sum = s->x[i] + change[i], added = sum - s->x[i];
+        const double lost = (s->x[i] - (sum - added)) + (change[i] - added);
+        const double small = lost + (s->carry[i] + correction[i]);
+        x[i] = sum + small;
+        carry[i] = small - (x[i] - sum);
         if (!isfinite(x[i])) return 0;
     }
     memcpy(s->x, x, sizeof x);
@@ -291,20 +301,19 @@ static double predator_prey_size(const double y[2], const double delta[2])
 
 /* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the extrapolated guess, and advance. The
    increment is corrected to first order by the last Newton correction, so that correction costs no evaluation:
-   a correction is accepted when the error that remains after it, quadratic in it, is below 1e-18. */
+   a correction is accepted when the error that remains after it, quadratic in it, is below 1e-20. */
 static predator_prey_status predator_prey_attempt(predator_prey_solver *s, int stage)
 {
     const double *coef = s->coef[stage];
     predator_prey_memory *memory = &s->memory[stage];
     double y[2], delta[2], displacement[2], increment[2];
     double jacobian[4], increment_jacobian[4];
-    predator_prey_predict(memory, y);
-    for (int i = 0; i < 2; ++i) y[i] += s->x[i];
+    if (!predator_prey_predict(memory, y)) memcpy(y, s->x, sizeof y);
     double previous = HUGE_VAL;
     for (int iteration = 0; iteration < 20; ++iteration) {
         predator_prey_linearise(coef, y, displacement, increment, jacobian, increment_jacobian);
         ++s->evaluations;
-        for (int i = 0; i < 2; ++i) delta[i] = ((y[i] - s->x[i]) - s->carry[i]) + displacement[i];
+        for (int i = 0; i < 2; ++i) delta[i] = ((y[i] - s->x[i]) + displacement[i]) - s->carry[i];
         const int regular = predator_prey_solve(jacobian, delta);
         const double size = predator_prey_size(y, delta);
         if (!isfinite(size)) return predator_prey_NOT_FINITE;
@@ -313,14 +322,12 @@ static predator_prey_status predator_prey_attempt(predator_prey_solver *s, int s
         const double growth = size / (previous * previous);
         const double remaining = size * size * (growth > 1.0 ? growth : 1.0);
         /* The second test: corrections no longer shrink, the solve has reached the level of rounding. */
-        if (remaining <= 1e-18 || (previous < 1e-8 && size > 0.25 * previous)) {
-            double offset[2];
-            for (int i = 0; i < 2; ++i) {
-                offset[i] = y[i] - s->x[i];
-                for (int j = 0; j < 2; ++j) increment[i] -= increment_jacobian[i * 2 + j] * delta[j];
-            }
-            if (!predator_prey_advance(s, increment)) return predator_prey_NOT_FINITE;
-            predator_prey_remember(memory, offset, iteration + 1);
+        if (remaining <= 1e-20 || (previous < 1e-8 && size > 0.25 * previous)) {
+            double correction[2] = { 0.0 };
+            for (int i = 0; i < 2; ++i)
+                for (int j = 0; j < 2; ++j) correction[i] -= increment_jacobian[i * 2 + j] * delta[j];
+            if (!predator_prey_advance(s, increment, correction)) return predator_prey_NOT_FINITE;
+            predator_prey_remember(memory, y, iteration + 1);
             return predator_prey_OK;
         }
         previous = size;
@@ -337,7 +344,7 @@ static predator_prey_status predator_prey_stages(predator_prey_solver *s)
     memcpy(carry, s->carry, sizeof carry);
     for (int stage = 0; stage < 1; ++stage) {
         predator_prey_status status = predator_prey_attempt(s, stage);
-        if (status != predator_prey_OK && s->memory[stage].rows > 0) {
+        if (status != predator_prey_OK && s->memory[stage].count > 0) {
             memset(&s->memory[stage], 0, sizeof s->memory[stage]);
             status = predator_prey_attempt(s, stage);
         }
@@ -377,11 +384,343 @@ predator_prey_status predator_prey_step(predator_prey_solver *s, double h)
     return status;
 }
 
+/*
+ * Eight at a time: below, the formulas of a step are evaluated for 8 steps of a trajectory, or members of an
+ * ensemble, at once. Compilers make vector instructions of the loops over lanes.
+ */
+enum { predator_prey_LANES = 8 };
+
+#if defined(__GNUC__)
+typedef double predator_prey_lanes[predator_prey_LANES] __attribute__((aligned(64))); /* a value in each lane */
+#else
+typedef double predator_prey_lanes[predator_prey_LANES];
+#endif
+
+#if defined(__clang__)
+#define predator_prey_EACH_LANE _Pragma("clang loop vectorize(assume_safety)")
+#pragma clang diagnostic ignored "-Wpass-failed"
+#elif defined(__GNUC__)
+#define predator_prey_EACH_LANE _Pragma("GCC ivdep") _Pragma("GCC unroll 1")
+#else
+#define predator_prey_EACH_LANE
+#endif
+
+/* What all blocks share: coefficients, the same in each lane, and the recurrences by which they are foreseen. */
+typedef struct {
+    int fits[1]; /* the fit that weight is of; -1 for none */
+    predator_prey_lanes coef[1][11], weight[1][32][2];
+} predator_prey_table;
+
+/* A stage in all lanes, linear around y: a residual r of alpha(y) = x takes inverse r from y and gain r from the
+   increment. */
+typedef struct {
+    predator_prey_lanes y[2], displacement[2], increment[2], residual[2];
+    predator_prey_lanes inverse[4], slope[4], gain[4];
+} predator_prey_lines;
+
+/* exp(u) - 1 for the loops over lanes: u = k log 2 + r, no branches. Infinite beyond |u| = 700.0. */
+static inline double predator_prey_expm1_lane(double u)
+{
+    const double shifted = u * 1.4426950408889634 + 6755399441055744.0, k = shifted - 6755399441055744.0;
+    const double r = (u - k * 0.6931471803691238) - k * 1.9082149292705877e-10;
+    uint64_t bits; /* the last bits of shifted are k */
+    double power, sum = 1.1470745597729725e-11;
+    memcpy(&bits, &shifted, sizeof bits);
+    bits = (bits + 1023) << 52;
+    memcpy(&power, &bits, sizeof power);
+    sum = sum * r + 1.6059043836821613e-10;
+    sum = sum * r + 2.08767569878681e-09;
+    sum = sum * r + 2.505210838544172e-08;
+    sum = sum * r + 2.755731922398589e-07;
+    sum = sum * r + 2.7557319223985893e-06;
+    sum = sum * r + 2.48015873015873e-05;
+    sum = sum * r + 0.0001984126984126984;
+    sum = sum * r + 0.001388888888888889;
+    sum = sum * r + 0.008333333333333333;
+    sum = sum * r + 0.041666666666666664;
+    sum = sum * r + 0.16666666666666666;
+    sum = sum * r + 0.5;
+    sum = sum * r * r + r;
+    return power * sum + (power - 1.0) + (fabs(u) <= 700.0 ? 0.0 : HUGE_VAL);
+}
+
+/* predator_prey_linearise in all lanes. */
+static void predator_prey_linearise_lanes(predator_prey_lanes coef[restrict 11],
+                                          predator_prey_lanes y[restrict 2],
+                                          predator_prey_lanes displacement[restrict 2],
+                                          predator_prey_lanes increment[restrict 2],
+                                          predator_prey_lanes jacobian[restrict 4],
+                                          predator_prey_lanes increment_jacobian[restrict 4])
+{
+    predator_prey_EACH_LANE
+    for (int lane = 0; lane < predator_prey_LANES; ++lane) {
+        const double prey = y[0][lane];
+        const double predator = y[1][lane];
+        const double t1 = 1.0 / predator;
+        const double t2 = coef[7][lane] * predator;
+        const double p_predator = coef[6][lane] + coef[5][lane] * t1 + prey * (t2 + (coef[2][lane] + coef[8][lane] * prey));
+        const double t3 = predator_prey_expm1_lane((-0.5) * (predator * p_predator));
+        const double t4 = 1.0 / prey;
+        const double t5 = coef[2][lane] + coef[4][lane] * prey;
+        const double p_prey = coef[1][lane] + coef[0][lane] * t4 + predator * (coef[3][lane] * predator + t5);
+        const double t6 = predator_prey_expm1_lane(0.5 * (prey * p_prey));
+        const double t7 = 1.0 + t3;
+        const double t8 = 1.0 / t7;
+        const double t9 = 1.0 + t8;
+        const double t10 = t3 * t9;
+        const double t11 = 1.0 + t6;
+        const double t12 = 1.0 / t11;
+        const double t13 = 1.0 + t12;
+        const double t14 = t6 * t13;
+        const double t15 = t2 + t5;
+        const double t16 = predator * t7;
+        const double t17 = prey * t16;
+        const double t18 = p_predator * t7;
+        const double t19 = coef[7][lane] * prey + coef[10][lane] * (t1 * t1);
+        const double t20 = p_prey * t11;
+        const double t21 = coef[4][lane] * predator + coef[9][lane] * (t4 * t4);
+        const double t22 = prey * t11;
+        const double t23 = predator * t22;
+        const double t24 = t8 * t8;
+        const double t25 = prey * (0.5 * (t3 * (t16 * t24)) - 0.5 * (t16 * t9));
+        const double t26 = t12 * t12;
+        const double t27 = predator * (0.5 * (t22 * t13) - 0.5 * (t6 * (t22 * t26)));
+        displacement[0][lane] = prey * t3;
+        displacement[1][lane] = predator * t6;
+        increment[0][lane] = -(prey * t10);
+        increment[1][lane] = -(predator * t14);
+        jacobian[0][lane] = 1.0 + (t3 - 0.5 * (t15 * t17));
+        jacobian[1][lane] = (-0.5) * (prey * t18) - 0.5 * (t19 * t17);
+        jacobian[2][lane] = 0.5 * (predator * t20) + 0.5 * (t21 * t23);
+        jacobian[3][lane] = 1.0 + (t6 + 0.5 * (t15 * t23));
+        increment_jacobian[0][lane] = -(t10 + t15 * t25);
+        increment_jacobian[1][lane] = -(prey * (0.5 * (t3 * (t24 * t18)) - 0.5 * (t18 * t9)) + t19 * t25);
+        increment_jacobian[2][lane] = -(predator * (0.5 * (t20 * t13) - 0.5 * (t6 * (t20 * t26))) + t21 * t27);
+        increment_jacobian[3][lane] = -(t14 + t15 * t27);
+    }
+}
+
+/* predator_prey_invert in all lanes. */
+static void predator_prey_invert_lanes(predator_prey_lanes matrix[restrict 4],
+                                       predator_prey_lanes slope[restrict 4],
+                                       predator_prey_lanes inverse[restrict 4],
+                                       predator_prey_lanes gain[restrict 4],
+                                       predator_prey_lanes reciprocal[restrict 2])
+{
+    predator_prey_EACH_LANE
+    for (int lane = 0; lane < predator_prey_LANES; ++lane) {
+        const double t1 = 1.0 / matrix[0][lane];
+        const double t2 = matrix[1][lane] * t1;
+        const double t3 = 1.0 / (matrix[3][lane] - matrix[2][lane] * t2);
+        const double t4 = matrix[2][lane] * t1 * t3;
+        const double t5 = t1 + t2 * t4;
+        const double t6 = t2 * t3;
+        inverse[0][lane] = t5;
+        inverse[1][lane] = -t6;
+        inverse[2][lane] = -t4;
+        inverse[3][lane] = t3;
+        gain[0][lane] = slope[0][lane] * t5 - slope[1][lane] * t4;
+        gain[1][lane] = slope[1][lane] * t3 - slope[0][lane] * t6;
+        gain[2][lane] = slope[2][lane] * t5 - slope[3][lane] * t4;
+        gain[3][lane] = slope[3][lane] * t3 - slope[2][lane] * t6;
+        reciprocal[0][lane] = t1;
+        reciprocal[1][lane] = t3;
+    }
+}
+
+/* Everything about a stage at the points y. The matrices are I + O(h): where a pivot is far from 1, all is infinite. */
+static void predator_prey_tabulate(predator_prey_lanes coef[restrict], predator_prey_lines *line)
+{
+    predator_prey_lanes jacobian[4], reciprocal[2];
+    predator_prey_linearise_lanes(coef, line->y, line->displacement, line->increment, jacobian, line->slope);
+    predator_prey_invert_lanes(jacobian, line->slope, line->inverse, line->gain, reciprocal);
+    for (int i = 0; i < 2; ++i) {
+        predator_prey_EACH_LANE
+        for (int lane = 0; lane < predator_prey_LANES; ++lane)
+            line->inverse[i][lane] += fabs(reciprocal[i][lane]) < 1e3 ? 0.0 : HUGE_VAL;
+    }
+}
+
+/* predator_prey_size in all lanes, summed over the components. */
+static void predator_prey_sizes(predator_prey_lanes y[restrict 2], predator_prey_lanes delta[restrict 2],
+    predator_prey_lanes size)
+{
+    predator_prey_lanes norm = { 0.0 };
+    memset(size, 0, predator_prey_LANES * sizeof size[0]);
+    for (int i = 0; i < 2; ++i)
+        for (int lane = 0; lane < predator_prey_LANES; ++lane)
+            norm[lane] = 0.0 * fabs(y[i][lane]) > norm[lane] ? 0.0 * fabs(y[i][lane]) : norm[lane];
+    for (int i = 0; i < 2; ++i) {
+        predator_prey_EACH_LANE
+        for (int lane = 0; lane < predator_prey_LANES; ++lane)
+            size[lane] += fabs(delta[i][lane]) / (fabs(y[i][lane]) + norm[lane] + DBL_MIN);
+    }
+}
+
+/* The steps of a block one after the other, each along the lines of its lane. As X, the state with its carry, gains
+   increment - gain residual, the next residual follows from this one; X itself is added up apart. */
+static void predator_prey_chain(predator_prey_lines line[1], double x[2], double carry[2])
+{
+    double residual[2], sum[2], small[2];
+    for (int i = 0; i < 2; ++i) {
+        residual[i] = ((line->y[i][0] - x[i]) + line->displacement[i][0]) - carry[i];
+        sum[i] = x[i];
+        small[i] = carry[i];
+    }
+    for (int k = 0; k < 1 * predator_prey_LANES; ++k) {
+        const int lane = k / 1, after = (k + 1) / 1 % predator_prey_LANES;
+        predator_prey_lines *at = &line[k % 1], *next = &line[(k + 1) % 1];
+        double correction[2] = { 0.0 };
+        for (int i = 0; i < 2; ++i) {
+            at->residual[i][lane] = residual[i];
+            for (int j = 0; j < 2; ++j) correction[i] -= at->gain[i * 2 + j][lane] * residual[j];
+        }
+        for (int i = 0; i < 2; ++i) {
+            const double change = at->increment[i][lane], total = sum[i] + change, added = total - sum[i];
+            const double turn = (next->displacement[i][after] - at->displacement[i][lane]) - change;
+            residual[i] = ((next->y[i][after] - at->y[i][lane]) + turn) + (residual[i] - correction[i]);
+            small[i] += ((sum[i] - (total - added)) + (change - added)) + correction[i];
+            sum[i] = total;
+        }
+    }
+    for (int i = 0; i < 2; ++i) {
+        x[i] = sum[i] + small[i];
+        carry[i] = small[i] - (x[i] - sum[i]);
+    }
+}
+
+/* Bring the table up to date. */
+static void predator_prey_tell(const predator_prey_solver *s, predator_prey_table *table)
+{
+    for (int stage = 0; stage < 1; ++stage) {
+        if (table->fits[stage] == s->memory[stage].fits) continue;
+        table->fits[stage] = s->memory[stage].fits;
+        for (int k = 0; k < 11; ++k)
+            for (int lane = 0; lane < predator_prey_LANES; ++lane) table->coef[stage][k][lane] = s->coef[stage][k];
+        memcpy(table->weight[stage], s->memory[stage].weight, sizeof table->weight[stage]);
+    }
+}
+
+/* The guesses for the next predator_prey_LANES values. */
+static void predator_prey_foresee(const predator_prey_memory *memory, predator_prey_lanes weight[restrict][2],
+    predator_prey_lanes y[restrict 2])
+{
+    const int last = memory->count - 1;
+    for (int i = 0; i < 2; ++i) {
+        predator_prey_EACH_LANE
+        for (int lane = 0; lane < predator_prey_LANES; ++lane) {
+            double even = 0.0, odd = 0.0;
+            for (int k = 0; k < 32; k += 2) {
+                even += weight[k][i][lane] * memory->past[last - k][i];
+                odd += weight[k + 1][i][lane] * memory->past[last - 1 - k][i];
+            }
+            y[i][lane] = even + odd;
+        }
+    }
+}
+
+/* Correct y by the residuals that the chain found. The largest size of a correction; infinite if one is not finite. */
+static double predator_prey_correct(predator_prey_lines *line)
+{
+    predator_prey_lanes size, delta[2];
+    double largest = 0.0, total = 0.0;
+    memset(delta, 0, sizeof delta);
+    for (int i = 0; i < 2; ++i)
+        for (int j = 0; j < 2; ++j) {
+            predator_prey_EACH_LANE
+            for (int lane = 0; lane < predator_prey_LANES; ++lane)
+                delta[i][lane] += line->inverse[i * 2 + j][lane] * line->residual[j][lane];
+        }
+    predator_prey_sizes(line->y, delta, size);
+    for (int i = 0; i < 2; ++i)
+        for (int lane = 0; lane < predator_prey_LANES; ++lane) line->y[i][lane] -= delta[i][lane];
+    for (int lane = 0; lane < predator_prey_LANES; ++lane) {
+        total += size[lane];
+        largest = size[lane] > largest ? size[lane] : largest;
+    }
+    return isfinite(total) ? largest : HUGE_VAL;
+}
+
+/* predator_prey_LANES steps at once: guess the points of all, and correct them together until the error that remains is as
+   small as after a single step. 0, and the solver as before, where that does not come about. */
+static int predator_prey_block(predator_prey_solver *s, predator_prey_table *table)
+{
+    predator_prey_lines line[1];
+    double x[2], carry[2], value[2], previous = HUGE_VAL;
+    int passes = 0, solved = 0;
+    for (int stage = 0; stage < 1; ++stage)
+        predator_prey_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
+    while (!solved) {
+        double size = 0.0;
+        for (int stage = 0; stage < 1; ++stage) predator_prey_tabulate(table->coef[stage], &line[stage]);
+        memcpy(x, s->x, sizeof x);
+        memcpy(carry, s->carry, sizeof carry);
+        predator_prey_chain(line, x, carry);
+        for (int stage = 0; stage < 1; ++stage) size = fmax(size, predator_prey_correct(&line[stage]));
+        s->evaluations += 1 * predator_prey_LANES;
+        const double growth = size / (previous * previous);
+        /* The second test: after the square of so small a correction there is rounding only. */
+        solved = size * size * (growth > 1.0 ? growth : 1.0) <= 1e-20 || (previous < 1e-8 && size < 1e-10);
+        if (++passes == 4 || !(size < previous)) break;
+        previous = size;
+    }
+    for (int i = 0; i < 2; ++i)
+        if (!isfinite(x[i])) return 0;
+    if (!solved) return 0;
+    memcpy(s->x, x, sizeof x);
+    memcpy(s->carry, carry, sizeof carry);
+    s->steps += predator_prey_LANES;
+    for (int stage = 0; stage < 1; ++stage) {
+        predator_prey_memory *memory = &s->memory[stage];
+        for (int lane = 0; lane < predator_prey_LANES; ++lane) {
+            for (int i = 0; i < 2; ++i) value[i] = line[stage].y[i][lane];
+            predator_prey_record(memory, value);
+        }
+        memory->slow = passes > 1 ? memory->slow + predator_prey_LANES : 0;
+        if (memory->slow > memory->patience) predator_prey_fit(memory);
+    }
+    return 1;
+}
+
+/* Whether a block may be tried: not before there are recurrences to guess with, and not for a while after one that
+   failed. They take a thousand steps to repay. */
+static int predator_prey_may_block(predator_prey_solver *s, double h, size_t steps)
+{
+    int fit = s->setback > 0 && s->steps - s->fitted >= 1000;
+    if (!s->ready || memcmp(&h, &s->h, sizeof h) != 0 || steps < predator_prey_LANES) return 0;
+    if (s->pause > 0) {
+        --s->pause;
+        return 0;
+    }
+    for (int stage = 0; stage < 1; ++stage) {
+        fit = fit || s->memory[stage].fits == 0;
+        if (s->memory[stage].count < 96) return 0;
+    }
+    if (fit && steps < 1000) return 0;
+    for (int stage = 0; stage < 1 && fit; ++stage) predator_prey_fit(&s->memory[stage]);
+    if (fit) s->fitted = s->steps;
+    return 1;
+}
+
+/* Blocks of steps where the motion can be foreseen, single steps elsewhere: the results differ by round-off only. */
 predator_prey_status predator_prey_integrate(predator_prey_solver *s, double h, size_t steps)
 {
-    for (size_t k = 0; k < steps; ++k) {
+    predator_prey_table table;
+    for (int stage = 0; stage < 1; ++stage) table.fits[stage] = -1;
+    while (steps > 0) {
+        if (s != NULL && predator_prey_may_block(s, h, steps)) {
+            predator_prey_tell(s, &table);
+            if (predator_prey_block(s, &table)) {
+                steps -= predator_prey_LANES;
+                s->setback /= 2;
+                continue;
+            }
+            s->setback = 2 * s->setback + predator_prey_LANES > 1000 ? 1000 : 2 * s->setback + predator_prey_LANES;
+            s->pause = s->setback;
+        }
         const predator_prey_status status = predator_prey_step(s, h);
         if (status != predator_prey_OK) return status;
+        --steps;
     }
     return predator_prey_OK;
 }

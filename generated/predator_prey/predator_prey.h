@@ -13,13 +13,12 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 22a6b412bf8b56263d602d516d7f46e8eb997988e56371f6fd63c72078e73a7a
+ * body-sha256: 427b13cbfaa5152ad178e6b65cc22be6529a7bf71c61cda4948dca2b2b1af096
  */
 #ifndef PREDATOR_PREY_H
 #define PREDATOR_PREY_H
 
 #include <stddef.h>
-
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -49,19 +48,17 @@ typedef enum {
     predator_prey_BAD_ARGUMENT    /* a null pointer, or a value that is not finite */
 } predator_prey_status;
 
-/* Recent values of the unknown of the inner solve, for its starting guess. Two predictors compete: extrapolation by
-   backward differences, and a linear recurrence fitted to the last 80 values; they affect speed only. */
+/* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
+   fitted to the last 96 values. They affect speed only. */
 typedef struct {
-    int rows;  /* rows of lag in use */
-    int guess; /* how many of them the extrapolation adds up */
-    int count; /* values in past */
-    int slow;  /* how many of the last steps took more than one iteration */
-    int trained; /* whether weight is set */
-    double lag[8][predator_prey_DIM]; /* backward differences, order by order */
-    double past[160][predator_prey_DIM];   /* values, the latest last */
-    double weight[16][predator_prey_DIM]; /* of past values, the latest first */
-    double predicted[2][predator_prey_DIM]; /* what the two predictors say of the next value */
-    double error[2];                     /* their recent errors */
+    int count;    /* values in past */
+    int order;    /* how many of them the extrapolation uses */
+    int fits;     /* how often weight has been fitted */
+    int fitting;  /* whether the recurrence is the better guess */
+    int slow;     /* how many of the last steps took more than one iteration */
+    int patience; /* how many of those before the recurrence is fitted again */
+    double past[192][predator_prey_DIM]; /* values, the latest last */
+    double weight[32][predator_prey_DIM][8]; /* of past values, the latest first, for the next values */
 } predator_prey_memory;
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with predator_prey_init. */
@@ -73,6 +70,9 @@ typedef struct {
     predator_prey_params params;
     double h;  /* the step size that coef belongs to */
     int ready; /* whether coef has been computed */
+    int pause;   /* steps to make singly before a block is tried */
+    int setback; /* the last pause, halved with every block that succeeds */
+    size_t fitted; /* steps when recurrences were last fitted for blocks */
     double coef[1][11]; /* what depends on params and h only, for each stage */
     predator_prey_memory memory[1];
 } predator_prey_solver;

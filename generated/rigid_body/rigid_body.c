@@ -14,12 +14,13 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: b0c8cbbfe966b6a243753284b53c81e6120fc4700836dcc80e5f8b4e2c7d52eb
+ * body-sha256: 1d18b63d451365bd23d12cf204128528461646202f4068cc0189068d309dc399
  */
 #include "rigid_body.h"
 
 #include <float.h>
 #include <math.h>
+#include <stdint.h>
 #include <string.h>
 
 const rigid_body_params rigid_body_default_params = { 2.0, 1.0, 0.6666666666666666 };
@@ -423,119 +424,128 @@ static int rigid_body_solve(double matrix[9], double side[3])
     return 1;
 }
 
-/* Keep the backward differences of a vector that varies slowly from step to step (y - x), and choose how
-   many of them to extrapolate with next time: the first difference left out estimates the error of the guess. */
-static void rigid_body_difference(rigid_body_memory *memory, const double value[3])
+/* The guess for the next value (y), from earlier ones; 0 if there are none. */
+static int rigid_body_predict(const rigid_body_memory *memory, double value[3])
 {
-    double row[3], least = HUGE_VAL;
-    const int rows = memory->rows < 8 ? memory->rows + 1 : 8;
-    memcpy(row, value, sizeof row);
-    for (int k = 0; k < rows; ++k) {
-        double size = 0.0;
-        for (int i = 0; i < 3; ++i) {
-            const double before = k < memory->rows ? memory->lag[k][i] : 0.0;
-            memory->lag[k][i] = row[i];
-            size += fabs(row[i]);
-            row[i] -= before;
+    const int last = memory->count - 1;
+    double odd[3] = { 0.0 }, binomial = -1.0;
+    memset(value, 0, 3 * sizeof value[0]);
+    if (memory->fitting) {
+        for (int k = 0; k < 32; k += 2)
+            for (int i = 0; i < 3; ++i) {
+                value[i] += memory->weight[k][i][0] * memory->past[last - k][i];
+                odd[i] += memory->weight[k + 1][i][0] * memory->past[last - 1 - k][i];
+            }
+        for (int i = 0; i < 3; ++i) value[i] += odd[i];
+    } else {
+        for (int k = 0; k < memory->order && k <= last; ++k) {
+            binomial *= -(double)(memory->order - k) / (k + 1);
+            for (int i = 0; i < 3; ++i) value[i] += binomial * memory->past[last - k][i];
         }
+    }
+    return last >= 0;
+}
+
+/* Choose the guess that would have been best for a value that took several iterations. */
+static void rigid_body_judge(rigid_body_memory *memory, const double value[3])
+{
+    double row[8 + 1][3], guess[3], least = HUGE_VAL, fitted = HUGE_VAL;
+    const int rows = memory->count < 8 ? memory->count : 8;
+    memcpy(row[0], value, sizeof row[0]);
+    for (int k = 0; k < rows; ++k) memcpy(row[k + 1], memory->past[memory->count - 1 - k], sizeof row[0]);
+    for (int order = 1; order <= rows; ++order) { /* row[0] becomes the backward difference of this order */
+        double size = 0.0;
+        for (int k = 0; k <= rows - order; ++k)
+            for (int i = 0; i < 3; ++i) row[k][i] -= row[k + 1][i];
+        for (int i = 0; i < 3; ++i) size += fabs(row[0][i]);
         if (size < least) {
             least = size;
-            memory->guess = k;
+            memory->order = order;
         }
     }
-    memory->rows = rows;
-}
-
-/* The guess of the better predictor; zero without a history. Both are kept, to be judged by the solved value. */
-static void rigid_body_predict(rigid_body_memory *memory, double value[3])
-{
-    double(*guess)[3] = memory->predicted;
-    memset(memory->predicted, 0, sizeof memory->predicted);
-    for (int k = 0; k < memory->guess; ++k)
-        for (int i = 0; i < 3; ++i) guess[0][i] += memory->lag[k][i];
-    if (memory->trained) {
-        const int last = memory->count - 1;
-        double odd[3] = { 0.0 };
-        for (int k = 0; k < 16; k += 2)
-            for (int i = 0; i < 3; ++i) {
-                guess[1][i] += memory->weight[k][i] * memory->past[last - k][i];
-                odd[i] += memory->weight[k + 1][i] * memory->past[last - 1 - k][i];
-            }
-        for (int i = 0; i < 3; ++i) guess[1][i] += odd[i];
+    memory->fitting = memory->fits > 0;
+    if (memory->fitting && rigid_body_predict(memory, guess)) {
+        fitted = 0.0;
+        for (int i = 0; i < 3; ++i) fitted += fabs(value[i] - guess[i]);
     }
-    memcpy(value, guess[memory->trained && memory->error[1] <= memory->error[0]], 3 * sizeof value[0]);
+    memory->fitting = memory->fits > 0 && fitted <= least;
+    if (memory->order == 0) memory->order = 1;
 }
 
-/* Fit the recurrence value[m] = sum of weight[k] * value[m - 1 - k] to the history, component by component: ridge
-   least squares by modified Gram-Schmidt, the ridge at the level of rounding. */
+/* Fit the recurrences value[m + l] = sum of weight[k][..][l] * value[m - 1 - k], l = 0 ... 8 - 1, to the history,
+   component by component: ridge least squares by modified Gram-Schmidt, the ridge at the level of rounding. The last
+   8 columns of q are the right-hand sides. */
 static void rigid_body_train(rigid_body_memory *memory, int component)
 {
-    enum { ROWS = 80 - 16, ALL = 80 };
-    double q[16][ALL], r[16][16], b[ALL] = { 0.0 }, largest = 0.0;
-    const int first = memory->count - 80;
+    enum { WINDOW = 32, AHEAD = 8, ROWS = 96 - WINDOW - AHEAD + 1 };
+    double q[ROWS + WINDOW][WINDOW + AHEAD], r[WINDOW][WINDOW + AHEAD], largest = 0.0;
     memset(q, 0, sizeof q);
-    for (int i = 0; i < 80; ++i)
-        if (fabs(memory->past[first + i][component]) > largest) largest = fabs(memory->past[first + i][component]);
-    for (int k = 0; k < 16; ++k) {
-        for (int i = 0; i < ROWS; ++i) q[k][i] = memory->past[first + i + 16 - 1 - k][component];
-        q[k][ROWS + k] = 1e-13 * largest;
-    }
-    for (int i = 0; i < ROWS; ++i) b[i] = memory->past[first + i + 16][component];
-    for (int k = 0; k < 16; ++k) {
-        double norm = 0.0, along = 0.0;
-        for (int i = 0; i < ALL; ++i) norm += q[k][i] * q[k][i];
-        r[k][k] = sqrt(norm);
-        for (int i = 0; i < ALL; ++i) q[k][i] = norm > 0.0 ? q[k][i] / r[k][k] : 0.0;
-        for (int j = k + 1; j < 16; ++j) {
-            double dot = 0.0;
-            for (int i = 0; i < ALL; ++i) dot += q[k][i] * q[j][i];
-            r[k][j] = dot;
-            for (int i = 0; i < ALL; ++i) q[j][i] -= dot * q[k][i];
+    memset(r, 0, sizeof r);
+    for (int i = 0; i < ROWS; ++i) {
+        for (int j = 0; j < WINDOW + AHEAD; ++j) {
+            const int place = j < WINDOW ? WINDOW - 1 - j : j;
+            q[i][j] = memory->past[memory->count - 96 + i + place][component];
         }
-        for (int i = 0; i < ALL; ++i) along += q[k][i] * b[i];
-        memory->weight[k][component] = along;
-        for (int i = 0; i < ALL; ++i) b[i] -= along * q[k][i];
+        if (fabs(q[i][0]) > largest) largest = fabs(q[i][0]);
     }
-    for (int k = 16 - 1; k >= 0; --k) {
-        double sum = memory->weight[k][component];
-        for (int j = k + 1; j < 16; ++j) sum -= r[k][j] * memory->weight[j][component];
-        memory->weight[k][component] = r[k][k] > 0.0 ? sum / r[k][k] : 0.0;
+    for (int k = 0; k < WINDOW; ++k) q[ROWS + k][k] = 1e-13 * largest;
+    for (int k = 0; k < WINDOW; ++k) {
+        for (int i = 0; i < ROWS + WINDOW; ++i)
+            for (int j = k; j < WINDOW + AHEAD; ++j) r[k][j] += q[i][k] * q[i][j];
+        const double scale = r[k][k] > 0.0 ? 1.0 / r[k][k] : 0.0;
+        for (int j = k + 1; j < WINDOW + AHEAD; ++j) r[k][j] *= scale;
+        for (int i = 0; i < ROWS + WINDOW; ++i)
+            for (int j = k + 1; j < WINDOW + AHEAD; ++j) q[i][j] -= q[i][k] * r[k][j];
     }
+    for (int l = 0; l < AHEAD; ++l)
+        for (int k = WINDOW - 1; k >= 0; --k) {
+            double sum = r[k][WINDOW + l];
+            for (int j = k + 1; j < WINDOW; ++j) sum -= r[k][j] * memory->weight[j][component][l];
+            memory->weight[k][component][l] = sum;
+        }
 }
 
-/* Take in the solved value: update both predictors and their errors, and fit the recurrence when steps have been
-   taking several iterations. */
-static void rigid_body_remember(rigid_body_memory *memory, const double value[3], int iterations)
+/* Add a value to the history. */
+static void rigid_body_record(rigid_body_memory *memory, const double value[3])
 {
-    for (int kind = 0; kind < 2; ++kind) {
-        double error = 0.0;
-        for (int i = 0; i < 3; ++i) error += fabs(value[i] - memory->predicted[kind][i]);
-        memory->error[kind] = fmax(0.8 * memory->error[kind], error);
-    }
-    rigid_body_difference(memory, value);
-    if (memory->count == 160) {
-        memmove(memory->past, memory->past + 160 - 80, 80 * sizeof memory->past[0]);
-        memory->count = 80;
+    if (memory->count == 192) {
+        memmove(memory->past, memory->past + 192 - 96, 96 * sizeof memory->past[0]);
+        memory->count = 96;
     }
     memcpy(memory->past[memory->count++], value, 3 * sizeof value[0]);
-    memory->slow = iterations > 1 ? memory->slow + 1 : 0;
-    if (memory->slow >= 80 && memory->count >= 80) {
-        for (int i = 0; i < 3; ++i) rigid_body_train(memory, i);
-        memory->trained = 1;
-        memory->error[1] = 0.0;
-        memory->slow = -80;
-    }
 }
 
-/* x + change in compensated arithmetic. 0, and x as before, if the sum is not finite. */
-static int rigid_body_advance(rigid_body_solver *s, const double change[3])
+/* Fit the recurrence to the last values; with every time, wait longer before it is done again. */
+static void rigid_body_fit(rigid_body_memory *memory)
+{
+    for (int i = 0; i < 3; ++i) rigid_body_train(memory, i);
+    memory->fitting = 1;
+    ++memory->fits;
+    memory->slow = 0;
+    memory->patience = memory->patience < 10000 ? 2 * memory->patience + 96 : 20000;
+}
+
+/* Take in the solved value: what took one iteration needs no better guess. */
+static void rigid_body_remember(rigid_body_memory *memory, const double value[3], int iterations)
+{
+    if (iterations > 1) rigid_body_judge(memory, value);
+    rigid_body_record(memory, value);
+    memory->slow = iterations > 1 ? memory->slow + 1 : 0;
+    if (memory->slow > memory->patience && memory->count >= 96) rigid_body_fit(memory);
+}
+
+/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last
+   bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the
+   sum is not finite. */
+static int rigid_body_advance(rigid_body_solver *s, const double change[3], const double correction[3])
 {
     double x[3], carry[3];
     for (int i = 0; i < 3; ++i) {
-        const double addend = change[i] + s->carry[i];
-        x[i] = s->x[i] + addend;
-        const double added = x[i] - s->x[i];
-        carry[i] = (s->x[i] - (x[i] - added)) + (addend - added);
+        const double sum = s->x[i] + change[i], added = sum - s->x[i];
+        const double lost = (s->x[i] - (sum - added)) + (change[i] - added);
+        const double small = lost + (s->carry[i] + correction[i]);
+        x[i] = sum + small;
+        carry[i] = small - (x[i] - sum);
         if (!isfinite(x[i])) return 0;
     }
     memcpy(s->x, x, sizeof x);
@@ -559,20 +569,19 @@ static double rigid_body_size(const double y[3], const double delta[3])
 
 /* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the extrapolated guess, and advance. The
    increment is corrected to first order by the last Newton correction, so that correction costs no evaluation:
-   a correction is accepted when the error that remains after it, quadratic in it, is below 1e-18. */
+   a correction is accepted when the error that remains after it, quadratic in it, is below 1e-20. */
 static rigid_body_status rigid_body_attempt(rigid_body_solver *s, int stage)
 {
     const double *coef = s->coef[stage];
     rigid_body_memory *memory = &s->memory[stage];
     double y[3], delta[3], displacement[3], increment[3];
     double jacobian[9], increment_jacobian[9];
-    rigid_body_predict(memory, y);
-    for (int i = 0; i < 3; ++i) y[i] += s->x[i];
+    if (!rigid_body_predict(memory, y)) memcpy(y, s->x, sizeof y);
     double previous = HUGE_VAL;
     for (int iteration = 0; iteration < 20; ++iteration) {
         rigid_body_linearise(coef, y, displacement, increment, jacobian, increment_jacobian);
         ++s->evaluations;
-        for (int i = 0; i < 3; ++i) delta[i] = ((y[i] - s->x[i]) - s->carry[i]) + displacement[i];
+        for (int i = 0; i < 3; ++i) delta[i] = ((y[i] - s->x[i]) + displacement[i]) - s->carry[i];
         const int regular = rigid_body_solve(jacobian, delta);
         const double size = rigid_body_size(y, delta);
         if (!isfinite(size)) return rigid_body_NOT_FINITE;
@@ -581,14 +590,12 @@ static rigid_body_status rigid_body_attempt(rigid_body_solver *s, int stage)
         const double growth = size / (previous * previous);
         const double remaining = size * size * (growth > 1.0 ? growth : 1.0);
         /* The second test: corrections no longer shrink, the solve has reached the level of rounding. */
-        if (remaining <= 1e-18 || (previous < 1e-8 && size > 0.25 * previous)) {
-            double offset[3];
-            for (int i = 0; i < 3; ++i) {
-                offset[i] = y[i] - s->x[i];
-                for (int j = 0; j < 3; ++j) increment[i] -= increment_jacobian[i * 3 + j] * delta[j];
-            }
-            if (!rigid_body_advance(s, increment)) return rigid_body_NOT_FINITE;
-            rigid_body_remember(memory, offset, iteration + 1);
+        if (remaining <= 1e-20 || (previous < 1e-8 && size > 0.25 * previous)) {
+            double correction[3] = { 0.0 };
+            for (int i = 0; i < 3; ++i)
+                for (int j = 0; j < 3; ++j) correction[i] -= increment_jacobian[i * 3 + j] * delta[j];
+            if (!rigid_body_advance(s, increment, correction)) return rigid_body_NOT_FINITE;
+            rigid_body_remember(memory, y, iteration + 1);
             return rigid_body_OK;
         }
         previous = size;
@@ -605,7 +612,7 @@ static rigid_body_status rigid_body_stages(rigid_body_solver *s)
     memcpy(carry, s->carry, sizeof carry);
     for (int stage = 0; stage < 1; ++stage) {
         rigid_body_status status = rigid_body_attempt(s, stage);
-        if (status != rigid_body_OK && s->memory[stage].rows > 0) {
+        if (status != rigid_body_OK && s->memory[stage].count > 0) {
             memset(&s->memory[stage], 0, sizeof s->memory[stage]);
             status = rigid_body_attempt(s, stage);
         }
@@ -781,11 +788,432 @@ rigid_body_status rigid_body_step(rigid_body_solver *s, double h)
     return status;
 }
 
+/*
+ * Eight at a time: below, the formulas of a step are evaluated for 8 steps of a trajectory, or members of an
+ * ensemble, at once. Compilers make vector instructions of the loops over lanes.
+ */
+enum { rigid_body_LANES = 8 };
+
+#if defined(__GNUC__)
+typedef double rigid_body_lanes[rigid_body_LANES] __attribute__((aligned(64))); /* a value in each lane */
+#else
+typedef double rigid_body_lanes[rigid_body_LANES];
+#endif
+
+#if defined(__clang__)
+#define rigid_body_EACH_LANE _Pragma("clang loop vectorize(assume_safety)")
+#pragma clang diagnostic ignored "-Wpass-failed"
+#elif defined(__GNUC__)
+#define rigid_body_EACH_LANE _Pragma("GCC ivdep") _Pragma("GCC unroll 1")
+#else
+#define rigid_body_EACH_LANE
+#endif
+
+/* What all blocks share: coefficients, the same in each lane, and the recurrences by which they are foreseen. */
+typedef struct {
+    int fits[1]; /* the fit that weight is of; -1 for none */
+    rigid_body_lanes coef[1][35], weight[1][32][3];
+} rigid_body_table;
+
+/* A stage in all lanes, linear around y: a residual r of alpha(y) = x takes inverse r from y and gain r from the
+   increment. */
+typedef struct {
+    rigid_body_lanes y[3], displacement[3], increment[3], residual[3];
+    rigid_body_lanes inverse[9], slope[9], gain[9];
+} rigid_body_lines;
+
+/* rigid_body_phi0 for the loops over lanes: no branches. Infinite beyond |s| = 4.0. */
+static inline double rigid_body_phi0_lane(double s)
+{
+    double sum = 1.455172475614865e-27;
+    sum = sum * s + 5.744790668872202e-26;
+    sum = sum * s + 2.267952452337683e-24;
+    sum = sum * s + 8.953517427037546e-23;
+    sum = sum * s + 3.534707039629467e-21;
+    sum = sum * s + 1.3954464685812522e-19;
+    sum = sum * s + 5.5090028283602295e-18;
+    sum = sum * s + 2.174868698558062e-16;
+    sum = sum * s + 8.586062056277845e-15;
+    sum = sum * s + 3.3896802963225827e-13;
+    sum = sum * s + 1.3382536530684679e-11;
+    sum = sum * s + 5.284190138687493e-10;
+    sum = sum * s + 2.08767569878681e-08;
+    sum = sum * s + 8.267195767195768e-07;
+    sum = sum * s + 3.306878306878307e-05;
+    sum = sum * s + 0.001388888888888889;
+    sum = sum * s + 0.08333333333333333;
+    return sum + (fabs(s) <= 4.0 ? 0.0 : HUGE_VAL);
+}
+
+/* rigid_body_phi1 for the loops over lanes: no branches. Infinite beyond |s| = 4.0. */
+static inline double rigid_body_phi1_lane(double s)
+{
+    double sum = 6.266191399131027e-28;
+    sum = sum * s + 2.328275960983784e-26;
+    sum = sum * s + 8.617186003308303e-25;
+    sum = sum * s + 3.1751334332727565e-23;
+    sum = sum * s + 1.163957265514881e-21;
+    sum = sum * s + 4.241648447555361e-20;
+    sum = sum * s + 1.5349911154393775e-18;
+    sum = sum * s + 5.5090028283602297e-17;
+    sum = sum * s + 1.9573818287022555e-15;
+    sum = sum * s + 6.868849645022276e-14;
+    sum = sum * s + 2.372776207425808e-12;
+    sum = sum * s + 8.029521918410807e-11;
+    sum = sum * s + 2.6420950693437467e-09;
+    sum = sum * s + 8.35070279514724e-08;
+    sum = sum * s + 2.48015873015873e-06;
+    sum = sum * s + 6.613756613756614e-05;
+    sum = sum * s + 0.001388888888888889;
+    return sum + (fabs(s) <= 4.0 ? 0.0 : HUGE_VAL);
+}
+
+/* rigid_body_linearise in all lanes. */
+static void rigid_body_linearise_lanes(rigid_body_lanes coef[restrict 35], rigid_body_lanes y[restrict 3],
+                                       rigid_body_lanes displacement[restrict 3],
+                                       rigid_body_lanes increment[restrict 3],
+                                       rigid_body_lanes jacobian[restrict 9],
+                                       rigid_body_lanes increment_jacobian[restrict 9])
+{
+    rigid_body_EACH_LANE
+    for (int lane = 0; lane < rigid_body_LANES; ++lane) {
+        const double x1 = y[0][lane];
+        const double x2 = y[1][lane];
+        const double x3 = y[2][lane];
+        const double t1 = x1 * x1;
+        const double t2 = x2 * x2;
+        const double t3 = coef[4][lane] * t2;
+        const double t4 = x3 * x3;
+        const double t5 = coef[1][lane] + coef[18][lane] * t1;
+        const double t6 = coef[9][lane] + coef[16][lane] * t2;
+        const double p_x3 = x3 * (t1 * (t3 + coef[17][lane] * t4 + t5) + (coef[14][lane] + t2 * (coef[15][lane] * t4 + t6)));
+        const double t7 = coef[4][lane] * t4;
+        const double t8 = coef[5][lane] * t2 + t7;
+        const double t9 = coef[2][lane] * t4;
+        const double p_x1 = x1 * (t2 * (coef[3][lane] + coef[7][lane] * t1 + t8) + (coef[0][lane] + t4 * (t9 + (coef[1][lane] + coef[6][lane] * t1))));
+        const double t10 = x3 * p_x1;
+        const double t11 = x1 * p_x3;
+        const double t12 = t10 - t11;
+        const double t13 = coef[3][lane] + coef[13][lane] * t1;
+        const double t14 = coef[10][lane] * t4;
+        const double p_x2 = x2 * (t1 * (coef[12][lane] * t2 + t7 + t13) + (coef[8][lane] + t4 * (t14 + (coef[9][lane] + coef[11][lane] * t2))));
+        const double t15 = x1 * p_x2;
+        const double t16 = x2 * p_x1;
+        const double t17 = t15 - t16;
+        const double t18 = p_x3 * t12 - p_x2 * t17;
+        const double t19 = p_x3 * p_x3;
+        const double t20 = p_x1 * p_x1;
+        const double t21 = p_x2 * p_x2;
+        const double t22 = t20 + t21;
+        const double t23 = t19 + t22;
+        const double t24 = rigid_body_phi0_lane(t23);
+        const double t25 = x2 * p_x3;
+        const double t26 = x3 * p_x2;
+        const double t27 = t25 - t26;
+        const double t28 = p_x1 * t17 - p_x3 * t27;
+        const double t29 = p_x2 * t27 - p_x1 * t12;
+        const double t30 = x1 * x3 * (coef[25][lane] + coef[27][lane] * t1 + (coef[26][lane] * t4 + coef[22][lane] * t2));
+        const double t31 = rigid_body_phi1_lane(t23);
+        const double t32 = p_x3 * t31;
+        const double t33 = 0.5 * x2;
+        const double t34 = (t12 - t11) * t24 + 2.0 * (t18 * t32) - t33;
+        const double t35 = t2 * (coef[3][lane] + coef[20][lane] * t1 + t8) + (coef[0][lane] + t4 * (t9 + (coef[1][lane] + coef[19][lane] * t1)));
+        const double t36 = x2 * p_x2;
+        const double t37 = x3 * p_x3;
+        const double t38 = p_x1 * t31;
+        const double t39 = (t36 + t37) * t24 + 2.0 * (t18 * t38);
+        const double t40 = x1 * x2 * (coef[21][lane] + coef[24][lane] * t1 + (coef[22][lane] * t4 + coef[23][lane] * t2));
+        const double t41 = 0.5 * x3;
+        const double t42 = p_x2 * t31;
+        const double t43 = t41 + (2.0 * (t18 * t42) - (t15 + t17) * t24);
+        const double t44 = p_x1 * p_x2 * t24;
+        const double t45 = 0.5 * p_x3;
+        const double t46 = x2 * x3 * (coef[31][lane] * t4 + coef[32][lane] * t2 + (coef[30][lane] + coef[22][lane] * t1));
+        const double t47 = t1 * (t13 + (t7 + coef[29][lane] * t2)) + (coef[8][lane] + t4 * (t14 + (coef[9][lane] + coef[28][lane] * t2)));
+        const double t48 = 0.5 * p_x2;
+        const double t49 = p_x1 * p_x3 * t24;
+        const double t50 = t1 * (t3 + coef[34][lane] * t4 + t5) + (coef[14][lane] + t2 * (coef[33][lane] * t4 + t6));
+        const double t51 = 0.5 * x1;
+        const double t52 = t51 + (2.0 * (t28 * t32) - (t25 + t27) * t24);
+        const double t53 = x1 * p_x1;
+        const double t54 = (t53 + t37) * t24 + 2.0 * (t28 * t42);
+        const double t55 = (t17 - t16) * t24 + 2.0 * (t28 * t38) - t41;
+        const double t56 = p_x2 * p_x3 * t24;
+        const double t57 = 0.5 * p_x1;
+        const double t58 = (t36 + t53) * t24 + 2.0 * (t29 * t32);
+        const double t59 = (t27 - t26) * t24 + 2.0 * (t29 * t42) - t51;
+        const double t60 = t33 + (2.0 * (t29 * t38) - (t10 + t12) * t24);
+        const double t61 = x2 * t30;
+        const double t62 = x3 * t40;
+        const double t63 = x1 * t46;
+        displacement[0][lane] = t18 * t24 - 0.5 * t27;
+        displacement[1][lane] = t28 * t24 - 0.5 * t12;
+        displacement[2][lane] = t24 * t29 - 0.5 * t17;
+        increment[0][lane] = t27;
+        increment[1][lane] = t12;
+        increment[2][lane] = t17;
+        jacobian[0][lane] = 1.0 + (t30 * t34 + (t35 * t39 + t40 * t43) - (t19 + t21) * t24);
+        jacobian[1][lane] = t44 - t45 + (t46 * t34 + (t40 * t39 + t47 * t43));
+        jacobian[2][lane] = t48 + t49 + (t50 * t34 + (t30 * t39 + t46 * t43));
+        jacobian[3][lane] = t45 + t44 + (t30 * t52 + (t40 * t54 + t35 * t55));
+        jacobian[4][lane] = 1.0 + (t46 * t52 + (t47 * t54 + t40 * t55) - (t20 + t19) * t24);
+        jacobian[5][lane] = t56 - t57 + (t50 * t52 + (t46 * t54 + t30 * t55));
+        jacobian[6][lane] = t49 - t48 + (t30 * t58 + (t40 * t59 + t35 * t60));
+        jacobian[7][lane] = t57 + t56 + (t46 * t58 + (t40 * t60 + t47 * t59));
+        jacobian[8][lane] = 1.0 + (t50 * t58 + (t30 * t60 + t46 * t59) - t22 * t24);
+        increment_jacobian[0][lane] = t61 - t62;
+        increment_jacobian[1][lane] = p_x3 + (x2 * t46 - x3 * t47);
+        increment_jacobian[2][lane] = x2 * t50 - x3 * t46 - p_x2;
+        increment_jacobian[3][lane] = x3 * t35 - x1 * t30 - p_x3;
+        increment_jacobian[4][lane] = t62 - t63;
+        increment_jacobian[5][lane] = p_x1 + (x3 * t30 - x1 * t50);
+        increment_jacobian[6][lane] = p_x2 + (x1 * t40 - x2 * t35);
+        increment_jacobian[7][lane] = x1 * t47 - x2 * t40 - p_x1;
+        increment_jacobian[8][lane] = t63 - t61;
+    }
+}
+
+/* rigid_body_invert in all lanes. */
+static void rigid_body_invert_lanes(rigid_body_lanes matrix[restrict 9], rigid_body_lanes slope[restrict 9],
+                                    rigid_body_lanes inverse[restrict 9], rigid_body_lanes gain[restrict 9],
+                                    rigid_body_lanes reciprocal[restrict 3])
+{
+    rigid_body_EACH_LANE
+    for (int lane = 0; lane < rigid_body_LANES; ++lane) {
+        const double t1 = 1.0 / matrix[0][lane];
+        const double t2 = matrix[1][lane] * t1;
+        const double t3 = 1.0 / (matrix[4][lane] - matrix[3][lane] * t2);
+        const double t4 = matrix[3][lane] * t1 * t3;
+        const double t5 = matrix[2][lane] * t1;
+        const double t6 = (matrix[5][lane] - matrix[3][lane] * t5) * t3;
+        const double t7 = t5 - t2 * t6;
+        const double t8 = matrix[7][lane] - matrix[6][lane] * t2;
+        const double t9 = 1.0 / (matrix[8][lane] - matrix[6][lane] * t5 - t8 * t6);
+        const double t10 = (t8 * t4 - matrix[6][lane] * t1) * t9;
+        const double t11 = t1 + t2 * t4 - t7 * t10;
+        const double t12 = t8 * t3 * t9;
+        const double t13 = t7 * t12 - t2 * t3;
+        const double t14 = t7 * t9;
+        const double t15 = t4 + t6 * t10;
+        const double t16 = t3 + t6 * t12;
+        const double t17 = t6 * t9;
+        inverse[0][lane] = t11;
+        inverse[1][lane] = t13;
+        inverse[2][lane] = -t14;
+        inverse[3][lane] = -t15;
+        inverse[4][lane] = t16;
+        inverse[5][lane] = -t17;
+        inverse[6][lane] = t10;
+        inverse[7][lane] = -t12;
+        inverse[8][lane] = t9;
+        gain[0][lane] = slope[2][lane] * t10 + (slope[0][lane] * t11 - slope[1][lane] * t15);
+        gain[1][lane] = slope[0][lane] * t13 + slope[1][lane] * t16 - slope[2][lane] * t12;
+        gain[2][lane] = slope[2][lane] * t9 - (slope[0][lane] * t14 + slope[1][lane] * t17);
+        gain[3][lane] = slope[5][lane] * t10 + (slope[3][lane] * t11 - slope[4][lane] * t15);
+        gain[4][lane] = slope[3][lane] * t13 + slope[4][lane] * t16 - slope[5][lane] * t12;
+        gain[5][lane] = slope[5][lane] * t9 - (slope[4][lane] * t17 + slope[3][lane] * t14);
+        gain[6][lane] = slope[8][lane] * t10 + (slope[6][lane] * t11 - slope[7][lane] * t15);
+        gain[7][lane] = slope[6][lane] * t13 + slope[7][lane] * t16 - slope[8][lane] * t12;
+        gain[8][lane] = slope[8][lane] * t9 - (slope[6][lane] * t14 + slope[7][lane] * t17);
+        reciprocal[0][lane] = t1;
+        reciprocal[1][lane] = t3;
+        reciprocal[2][lane] = t9;
+    }
+}
+
+/* Everything about a stage at the points y. The matrices are I + O(h): where a pivot is far from 1, all is infinite. */
+static void rigid_body_tabulate(rigid_body_lanes coef[restrict], rigid_body_lines *line)
+{
+    rigid_body_lanes jacobian[9], reciprocal[3];
+    rigid_body_linearise_lanes(coef, line->y, line->displacement, line->increment, jacobian, line->slope);
+    rigid_body_invert_lanes(jacobian, line->slope, line->inverse, line->gain, reciprocal);
+    for (int i = 0; i < 3; ++i) {
+        rigid_body_EACH_LANE
+        for (int lane = 0; lane < rigid_body_LANES; ++lane)
+            line->inverse[i][lane] += fabs(reciprocal[i][lane]) < 1e3 ? 0.0 : HUGE_VAL;
+    }
+}
+
+/* rigid_body_size in all lanes, summed over the components. */
+static void rigid_body_sizes(rigid_body_lanes y[restrict 3], rigid_body_lanes delta[restrict 3],
+    rigid_body_lanes size)
+{
+    rigid_body_lanes norm = { 0.0 };
+    memset(size, 0, rigid_body_LANES * sizeof size[0]);
+    for (int i = 0; i < 3; ++i)
+        for (int lane = 0; lane < rigid_body_LANES; ++lane)
+            norm[lane] = 1e-6 * fabs(y[i][lane]) > norm[lane] ? 1e-6 * fabs(y[i][lane]) : norm[lane];
+    for (int i = 0; i < 3; ++i) {
+        rigid_body_EACH_LANE
+        for (int lane = 0; lane < rigid_body_LANES; ++lane)
+            size[lane] += fabs(delta[i][lane]) / (fabs(y[i][lane]) + norm[lane] + DBL_MIN);
+    }
+}
+
+/* The steps of a block one after the other, each along the lines of its lane. As X, the state with its carry, gains
+   increment - gain residual, the next residual follows from this one; X itself is added up apart. */
+static void rigid_body_chain(rigid_body_lines line[1], double x[3], double carry[3])
+{
+    double residual[3], sum[3], small[3];
+    for (int i = 0; i < 3; ++i) {
+        residual[i] = ((line->y[i][0] - x[i]) + line->displacement[i][0]) - carry[i];
+        sum[i] = x[i];
+        small[i] = carry[i];
+    }
+    for (int k = 0; k < 1 * rigid_body_LANES; ++k) {
+        const int lane = k / 1, after = (k + 1) / 1 % rigid_body_LANES;
+        rigid_body_lines *at = &line[k % 1], *next = &line[(k + 1) % 1];
+        double correction[3] = { 0.0 };
+        for (int i = 0; i < 3; ++i) {
+            at->residual[i][lane] = residual[i];
+            for (int j = 0; j < 3; ++j) correction[i] -= at->gain[i * 3 + j][lane] * residual[j];
+        }
+        for (int i = 0; i < 3; ++i) {
+            const double change = at->increment[i][lane], total = sum[i] + change, added = total - sum[i];
+            const double turn = (next->displacement[i][after] - at->displacement[i][lane]) - change;
+            residual[i] = ((next->y[i][after] - at->y[i][lane]) + turn) + (residual[i] - correction[i]);
+            small[i] += ((sum[i] - (total - added)) + (change - added)) + correction[i];
+            sum[i] = total;
+        }
+    }
+    for (int i = 0; i < 3; ++i) {
+        x[i] = sum[i] + small[i];
+        carry[i] = small[i] - (x[i] - sum[i]);
+    }
+}
+
+/* Bring the table up to date. */
+static void rigid_body_tell(const rigid_body_solver *s, rigid_body_table *table)
+{
+    for (int stage = 0; stage < 1; ++stage) {
+        if (table->fits[stage] == s->memory[stage].fits) continue;
+        table->fits[stage] = s->memory[stage].fits;
+        for (int k = 0; k < 35; ++k)
+            for (int lane = 0; lane < rigid_body_LANES; ++lane) table->coef[stage][k][lane] = s->coef[stage][k];
+        memcpy(table->weight[stage], s->memory[stage].weight, sizeof table->weight[stage]);
+    }
+}
+
+/* The guesses for the next rigid_body_LANES values. */
+static void rigid_body_foresee(const rigid_body_memory *memory, rigid_body_lanes weight[restrict][3],
+    rigid_body_lanes y[restrict 3])
+{
+    const int last = memory->count - 1;
+    for (int i = 0; i < 3; ++i) {
+        rigid_body_EACH_LANE
+        for (int lane = 0; lane < rigid_body_LANES; ++lane) {
+            double even = 0.0, odd = 0.0;
+            for (int k = 0; k < 32; k += 2) {
+                even += weight[k][i][lane] * memory->past[last - k][i];
+                odd += weight[k + 1][i][lane] * memory->past[last - 1 - k][i];
+            }
+            y[i][lane] = even + odd;
+        }
+    }
+}
+
+/* Correct y by the residuals that the chain found. The largest size of a correction; infinite if one is not finite. */
+static double rigid_body_correct(rigid_body_lines *line)
+{
+    rigid_body_lanes size, delta[3];
+    double largest = 0.0, total = 0.0;
+    memset(delta, 0, sizeof delta);
+    for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j) {
+            rigid_body_EACH_LANE
+            for (int lane = 0; lane < rigid_body_LANES; ++lane)
+                delta[i][lane] += line->inverse[i * 3 + j][lane] * line->residual[j][lane];
+        }
+    rigid_body_sizes(line->y, delta, size);
+    for (int i = 0; i < 3; ++i)
+        for (int lane = 0; lane < rigid_body_LANES; ++lane) line->y[i][lane] -= delta[i][lane];
+    for (int lane = 0; lane < rigid_body_LANES; ++lane) {
+        total += size[lane];
+        largest = size[lane] > largest ? size[lane] : largest;
+    }
+    return isfinite(total) ? largest : HUGE_VAL;
+}
+
+/* rigid_body_LANES steps at once: guess the points of all, and correct them together until the error that remains is as
+   small as after a single step. 0, and the solver as before, where that does not come about. */
+static int rigid_body_block(rigid_body_solver *s, rigid_body_table *table)
+{
+    rigid_body_lines line[1];
+    double x[3], carry[3], value[3], previous = HUGE_VAL;
+    int passes = 0, solved = 0;
+    for (int stage = 0; stage < 1; ++stage)
+        rigid_body_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
+    while (!solved) {
+        double size = 0.0;
+        for (int stage = 0; stage < 1; ++stage) rigid_body_tabulate(table->coef[stage], &line[stage]);
+        memcpy(x, s->x, sizeof x);
+        memcpy(carry, s->carry, sizeof carry);
+        rigid_body_chain(line, x, carry);
+        for (int stage = 0; stage < 1; ++stage) size = fmax(size, rigid_body_correct(&line[stage]));
+        s->evaluations += 1 * rigid_body_LANES;
+        const double growth = size / (previous * previous);
+        /* The second test: after the square of so small a correction there is rounding only. */
+        solved = size * size * (growth > 1.0 ? growth : 1.0) <= 1e-20 || (previous < 1e-8 && size < 1e-10);
+        if (++passes == 4 || !(size < previous)) break;
+        previous = size;
+    }
+    for (int i = 0; i < 3; ++i)
+        if (!isfinite(x[i])) return 0;
+    if (!solved) return 0;
+    memcpy(s->x, x, sizeof x);
+    memcpy(s->carry, carry, sizeof carry);
+    s->steps += rigid_body_LANES;
+    for (int stage = 0; stage < 1; ++stage) {
+        rigid_body_memory *memory = &s->memory[stage];
+        for (int lane = 0; lane < rigid_body_LANES; ++lane) {
+            for (int i = 0; i < 3; ++i) value[i] = line[stage].y[i][lane];
+            rigid_body_record(memory, value);
+        }
+        memory->slow = passes > 1 ? memory->slow + rigid_body_LANES : 0;
+        if (memory->slow > memory->patience) rigid_body_fit(memory);
+    }
+    return 1;
+}
+
+/* Whether a block may be tried: not before there are recurrences to guess with, and not for a while after one that
+   failed. They take a thousand steps to repay. */
+static int rigid_body_may_block(rigid_body_solver *s, double h, size_t steps)
+{
+    int fit = s->setback > 0 && s->steps - s->fitted >= 1000;
+    if (!s->ready || memcmp(&h, &s->h, sizeof h) != 0 || steps < rigid_body_LANES) return 0;
+    if (s->pause > 0) {
+        --s->pause;
+        return 0;
+    }
+    for (int stage = 0; stage < 1; ++stage) {
+        fit = fit || s->memory[stage].fits == 0;
+        if (s->memory[stage].count < 96) return 0;
+    }
+    if (fit && steps < 1000) return 0;
+    for (int stage = 0; stage < 1 && fit; ++stage) rigid_body_fit(&s->memory[stage]);
+    if (fit) s->fitted = s->steps;
+    return 1;
+}
+
+/* Blocks of steps where the motion can be foreseen, single steps elsewhere: the results differ by round-off only. */
 rigid_body_status rigid_body_integrate(rigid_body_solver *s, double h, size_t steps)
 {
-    for (size_t k = 0; k < steps; ++k) {
+    rigid_body_table table;
+    for (int stage = 0; stage < 1; ++stage) table.fits[stage] = -1;
+    while (steps > 0) {
+        if (s != NULL && rigid_body_may_block(s, h, steps)) {
+            rigid_body_tell(s, &table);
+            if (rigid_body_block(s, &table)) {
+                steps -= rigid_body_LANES;
+                s->setback /= 2;
+                continue;
+            }
+            s->setback = 2 * s->setback + rigid_body_LANES > 1000 ? 1000 : 2 * s->setback + rigid_body_LANES;
+            s->pause = s->setback;
+        }
         const rigid_body_status status = rigid_body_step(s, h);
         if (status != rigid_body_OK) return status;
+        --steps;
     }
     return rigid_body_OK;
 }

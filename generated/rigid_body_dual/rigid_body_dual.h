@@ -14,13 +14,12 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: bc15644167452e762ea35590bd7d01406c18aff89dedef75ba97218a1f3efee9
+ * body-sha256: 72af4354040f378fccf57fd648fa37a589d16575c0928ca101bc06893c0427b3
  */
 #ifndef RIGID_BODY_DUAL_H
 #define RIGID_BODY_DUAL_H
 
 #include <stddef.h>
-
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -49,19 +48,17 @@ typedef enum {
     rigid_body_dual_BAD_ARGUMENT    /* a null pointer, or a value that is not finite */
 } rigid_body_dual_status;
 
-/* Recent values of the unknown of the inner solve, for its starting guess. Two predictors compete: extrapolation by
-   backward differences, and a linear recurrence fitted to the last 80 values; they affect speed only. */
+/* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
+   fitted to the last 96 values. They affect speed only. */
 typedef struct {
-    int rows;  /* rows of lag in use */
-    int guess; /* how many of them the extrapolation adds up */
-    int count; /* values in past */
-    int slow;  /* how many of the last steps took more than one iteration */
-    int trained; /* whether weight is set */
-    double lag[8][rigid_body_dual_DIM]; /* backward differences, order by order */
-    double past[160][rigid_body_dual_DIM];   /* values, the latest last */
-    double weight[16][rigid_body_dual_DIM]; /* of past values, the latest first */
-    double predicted[2][rigid_body_dual_DIM]; /* what the two predictors say of the next value */
-    double error[2];                     /* their recent errors */
+    int count;    /* values in past */
+    int order;    /* how many of them the extrapolation uses */
+    int fits;     /* how often weight has been fitted */
+    int fitting;  /* whether the recurrence is the better guess */
+    int slow;     /* how many of the last steps took more than one iteration */
+    int patience; /* how many of those before the recurrence is fitted again */
+    double past[192][rigid_body_dual_DIM]; /* values, the latest last */
+    double weight[32][rigid_body_dual_DIM][8]; /* of past values, the latest first, for the next values */
 } rigid_body_dual_memory;
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with rigid_body_dual_init. */
@@ -74,6 +71,9 @@ typedef struct {
     double gauge[1]; /* multiples of C taken from H */
     double h;  /* the step size that coef belongs to */
     int ready; /* whether coef has been computed */
+    int pause;   /* steps to make singly before a block is tried */
+    int setback; /* the last pause, halved with every block that succeeds */
+    size_t fitted; /* steps when recurrences were last fitted for blocks */
     double coef[1][12]; /* what depends on params and h only, for each stage */
     rigid_body_dual_memory memory[1];
 } rigid_body_dual_solver;

@@ -13,13 +13,12 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 393212db3301cf495e22c8d636f6b9bf310d8c465c533e4f1704fb4c36034e2c
+ * body-sha256: 9b0bae22c3f6013e9a87815e2cc445ef99dba207f90228ababb2b7a69f4538e3
  */
 #ifndef SIR_EPIDEMIC_H
 #define SIR_EPIDEMIC_H
 
 #include <stddef.h>
-
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -47,19 +46,17 @@ typedef enum {
     sir_epidemic_BAD_ARGUMENT    /* a null pointer, or a value that is not finite */
 } sir_epidemic_status;
 
-/* Recent values of the unknown of the inner solve, for its starting guess. Two predictors compete: extrapolation by
-   backward differences, and a linear recurrence fitted to the last 80 values; they affect speed only. */
+/* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
+   fitted to the last 96 values. They affect speed only. */
 typedef struct {
-    int rows;  /* rows of lag in use */
-    int guess; /* how many of them the extrapolation adds up */
-    int count; /* values in past */
-    int slow;  /* how many of the last steps took more than one iteration */
-    int trained; /* whether weight is set */
-    double lag[8][sir_epidemic_DIM]; /* backward differences, order by order */
-    double past[160][sir_epidemic_DIM];   /* values, the latest last */
-    double weight[16][sir_epidemic_DIM]; /* of past values, the latest first */
-    double predicted[2][sir_epidemic_DIM]; /* what the two predictors say of the next value */
-    double error[2];                     /* their recent errors */
+    int count;    /* values in past */
+    int order;    /* how many of them the extrapolation uses */
+    int fits;     /* how often weight has been fitted */
+    int fitting;  /* whether the recurrence is the better guess */
+    int slow;     /* how many of the last steps took more than one iteration */
+    int patience; /* how many of those before the recurrence is fitted again */
+    double past[192][sir_epidemic_DIM]; /* values, the latest last */
+    double weight[32][sir_epidemic_DIM][1]; /* of past values, the latest first, for the next value */
 } sir_epidemic_memory;
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with sir_epidemic_init. */

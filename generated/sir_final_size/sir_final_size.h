@@ -12,13 +12,12 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 5c3fadfa2d996eab51cfb203fdbe7b682e370cee9ddeac029a76d5a13da90c48
+ * body-sha256: 3f3d7e83768bb036a44d715e10fe321cd38bf7a0fecc57fd13e9d523428c18ce
  */
 #ifndef SIR_FINAL_SIZE_H
 #define SIR_FINAL_SIZE_H
 
 #include <stddef.h>
-
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -46,19 +45,17 @@ typedef enum {
     sir_final_size_BAD_ARGUMENT    /* a null pointer, or a value that is not finite */
 } sir_final_size_status;
 
-/* Recent values of the unknown of the inner solve, for its starting guess. Two predictors compete: extrapolation by
-   backward differences, and a linear recurrence fitted to the last 80 values; they affect speed only. */
+/* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
+   fitted to the last 96 values. They affect speed only. */
 typedef struct {
-    int rows;  /* rows of lag in use */
-    int guess; /* how many of them the extrapolation adds up */
-    int count; /* values in past */
-    int slow;  /* how many of the last steps took more than one iteration */
-    int trained; /* whether weight is set */
-    double lag[8][sir_final_size_DIM]; /* backward differences, order by order */
-    double past[160][sir_final_size_DIM];   /* values, the latest last */
-    double weight[16][sir_final_size_DIM]; /* of past values, the latest first */
-    double predicted[2][sir_final_size_DIM]; /* what the two predictors say of the next value */
-    double error[2];                     /* their recent errors */
+    int count;    /* values in past */
+    int order;    /* how many of them the extrapolation uses */
+    int fits;     /* how often weight has been fitted */
+    int fitting;  /* whether the recurrence is the better guess */
+    int slow;     /* how many of the last steps took more than one iteration */
+    int patience; /* how many of those before the recurrence is fitted again */
+    double past[192][sir_final_size_DIM]; /* values, the latest last */
+    double weight[32][sir_final_size_DIM][1]; /* of past values, the latest first, for the next value */
 } sir_final_size_memory;
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with sir_final_size_init. */

@@ -14,13 +14,12 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 11904127e8fdf5a8d871d3bb98706f2eeea0957d53fff2fba2e9d8b12481480d
+ * body-sha256: 9e92a1462ce1946d335eab6805022f86552f0970dfd0d6cf6e519265e82b5122
  */
 #ifndef SKLYANIN_GYROSTAT_H
 #define SKLYANIN_GYROSTAT_H
 
 #include <stddef.h>
-
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -47,19 +46,17 @@ typedef enum {
     sklyanin_gyrostat_BAD_ARGUMENT    /* a null pointer, or a value that is not finite */
 } sklyanin_gyrostat_status;
 
-/* Recent values of the unknown of the inner solve, for its starting guess. Two predictors compete: extrapolation by
-   backward differences, and a linear recurrence fitted to the last 80 values; they affect speed only. */
+/* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
+   fitted to the last 96 values. They affect speed only. */
 typedef struct {
-    int rows;  /* rows of lag in use */
-    int guess; /* how many of them the extrapolation adds up */
-    int count; /* values in past */
-    int slow;  /* how many of the last steps took more than one iteration */
-    int trained; /* whether weight is set */
-    double lag[8][sklyanin_gyrostat_DIM]; /* backward differences, order by order */
-    double past[160][sklyanin_gyrostat_DIM];   /* values, the latest last */
-    double weight[16][sklyanin_gyrostat_DIM]; /* of past values, the latest first */
-    double predicted[2][sklyanin_gyrostat_DIM]; /* what the two predictors say of the next value */
-    double error[2];                     /* their recent errors */
+    int count;    /* values in past */
+    int order;    /* how many of them the extrapolation uses */
+    int fits;     /* how often weight has been fitted */
+    int fitting;  /* whether the recurrence is the better guess */
+    int slow;     /* how many of the last steps took more than one iteration */
+    int patience; /* how many of those before the recurrence is fitted again */
+    double past[192][sklyanin_gyrostat_DIM]; /* values, the latest last */
+    double weight[32][sklyanin_gyrostat_DIM][1]; /* of past values, the latest first, for the next value */
 } sklyanin_gyrostat_memory;
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with sklyanin_gyrostat_init. */

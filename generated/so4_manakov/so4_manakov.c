@@ -14,12 +14,13 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 22513c0569e0f430a3bb6f149be1ebb0a3087ee2a1a4eec8b18bddd2a3e8a8f7
+ * body-sha256: 77319fbe8a635d39496cb192fecdf8b58887c50e61497b8a6117b3cdf0f62a75
  */
 #include "so4_manakov.h"
 
 #include <float.h>
 #include <math.h>
+#include <stdint.h>
 #include <string.h>
 
 const so4_manakov_params so4_manakov_default_params = { 0 };
@@ -730,119 +731,128 @@ static int so4_manakov_solve(double matrix[36], double side[6])
     return 1;
 }
 
-/* Keep the backward differences of a vector that varies slowly from step to step (y - x), and choose how
-   many of them to extrapolate with next time: the first difference left out estimates the error of the guess. */
-static void so4_manakov_difference(so4_manakov_memory *memory, const double value[6])
+/* The guess for the next value (y), from earlier ones; 0 if there are none. */
+static int so4_manakov_predict(const so4_manakov_memory *memory, double value[6])
 {
-    double row[6], least = HUGE_VAL;
-    const int rows = memory->rows < 8 ? memory->rows + 1 : 8;
-    memcpy(row, value, sizeof row);
-    for (int k = 0; k < rows; ++k) {
-        double size = 0.0;
-        for (int i = 0; i < 6; ++i) {
-            const double before = k < memory->rows ? memory->lag[k][i] : 0.0;
-            memory->lag[k][i] = row[i];
-            size += fabs(row[i]);
-            row[i] -= before;
+    const int last = memory->count - 1;
+    double odd[6] = { 0.0 }, binomial = -1.0;
+    memset(value, 0, 6 * sizeof value[0]);
+    if (memory->fitting) {
+        for (int k = 0; k < 32; k += 2)
+            for (int i = 0; i < 6; ++i) {
+                value[i] += memory->weight[k][i][0] * memory->past[last - k][i];
+                odd[i] += memory->weight[k + 1][i][0] * memory->past[last - 1 - k][i];
+            }
+        for (int i = 0; i < 6; ++i) value[i] += odd[i];
+    } else {
+        for (int k = 0; k < memory->order && k <= last; ++k) {
+            binomial *= -(double)(memory->order - k) / (k + 1);
+            for (int i = 0; i < 6; ++i) value[i] += binomial * memory->past[last - k][i];
         }
+    }
+    return last >= 0;
+}
+
+/* Choose the guess that would have been best for a value that took several iterations. */
+static void so4_manakov_judge(so4_manakov_memory *memory, const double value[6])
+{
+    double row[8 + 1][6], guess[6], least = HUGE_VAL, fitted = HUGE_VAL;
+    const int rows = memory->count < 8 ? memory->count : 8;
+    memcpy(row[0], value, sizeof row[0]);
+    for (int k = 0; k < rows; ++k) memcpy(row[k + 1], memory->past[memory->count - 1 - k], sizeof row[0]);
+    for (int order = 1; order <= rows; ++order) { /* row[0] becomes the backward difference of this order */
+        double size = 0.0;
+        for (int k = 0; k <= rows - order; ++k)
+            for (int i = 0; i < 6; ++i) row[k][i] -= row[k + 1][i];
+        for (int i = 0; i < 6; ++i) size += fabs(row[0][i]);
         if (size < least) {
             least = size;
-            memory->guess = k;
+            memory->order = order;
         }
     }
-    memory->rows = rows;
-}
-
-/* The guess of the better predictor; zero without a history. Both are kept, to be judged by the solved value. */
-static void so4_manakov_predict(so4_manakov_memory *memory, double value[6])
-{
-    double(*guess)[6] = memory->predicted;
-    memset(memory->predicted, 0, sizeof memory->predicted);
-    for (int k = 0; k < memory->guess; ++k)
-        for (int i = 0; i < 6; ++i) guess[0][i] += memory->lag[k][i];
-    if (memory->trained) {
-        const int last = memory->count - 1;
-        double odd[6] = { 0.0 };
-        for (int k = 0; k < 16; k += 2)
-            for (int i = 0; i < 6; ++i) {
-                guess[1][i] += memory->weight[k][i] * memory->past[last - k][i];
-                odd[i] += memory->weight[k + 1][i] * memory->past[last - 1 - k][i];
-            }
-        for (int i = 0; i < 6; ++i) guess[1][i] += odd[i];
+    memory->fitting = memory->fits > 0;
+    if (memory->fitting && so4_manakov_predict(memory, guess)) {
+        fitted = 0.0;
+        for (int i = 0; i < 6; ++i) fitted += fabs(value[i] - guess[i]);
     }
-    memcpy(value, guess[memory->trained && memory->error[1] <= memory->error[0]], 6 * sizeof value[0]);
+    memory->fitting = memory->fits > 0 && fitted <= least;
+    if (memory->order == 0) memory->order = 1;
 }
 
-/* Fit the recurrence value[m] = sum of weight[k] * value[m - 1 - k] to the history, component by component: ridge
-   least squares by modified Gram-Schmidt, the ridge at the level of rounding. */
+/* Fit the recurrences value[m + l] = sum of weight[k][..][l] * value[m - 1 - k], l = 0 ... 8 - 1, to the history,
+   component by component: ridge least squares by modified Gram-Schmidt, the ridge at the level of rounding. The last
+   8 columns of q are the right-hand sides. */
 static void so4_manakov_train(so4_manakov_memory *memory, int component)
 {
-    enum { ROWS = 80 - 16, ALL = 80 };
-    double q[16][ALL], r[16][16], b[ALL] = { 0.0 }, largest = 0.0;
-    const int first = memory->count - 80;
+    enum { WINDOW = 32, AHEAD = 8, ROWS = 96 - WINDOW - AHEAD + 1 };
+    double q[ROWS + WINDOW][WINDOW + AHEAD], r[WINDOW][WINDOW + AHEAD], largest = 0.0;
     memset(q, 0, sizeof q);
-    for (int i = 0; i < 80; ++i)
-        if (fabs(memory->past[first + i][component]) > largest) largest = fabs(memory->past[first + i][component]);
-    for (int k = 0; k < 16; ++k) {
-        for (int i = 0; i < ROWS; ++i) q[k][i] = memory->past[first + i + 16 - 1 - k][component];
-        q[k][ROWS + k] = 1e-13 * largest;
-    }
-    for (int i = 0; i < ROWS; ++i) b[i] = memory->past[first + i + 16][component];
-    for (int k = 0; k < 16; ++k) {
-        double norm = 0.0, along = 0.0;
-        for (int i = 0; i < ALL; ++i) norm += q[k][i] * q[k][i];
-        r[k][k] = sqrt(norm);
-        for (int i = 0; i < ALL; ++i) q[k][i] = norm > 0.0 ? q[k][i] / r[k][k] : 0.0;
-        for (int j = k + 1; j < 16; ++j) {
-            double dot = 0.0;
-            for (int i = 0; i < ALL; ++i) dot += q[k][i] * q[j][i];
-            r[k][j] = dot;
-            for (int i = 0; i < ALL; ++i) q[j][i] -= dot * q[k][i];
+    memset(r, 0, sizeof r);
+    for (int i = 0; i < ROWS; ++i) {
+        for (int j = 0; j < WINDOW + AHEAD; ++j) {
+            const int place = j < WINDOW ? WINDOW - 1 - j : j;
+            q[i][j] = memory->past[memory->count - 96 + i + place][component];
         }
-        for (int i = 0; i < ALL; ++i) along += q[k][i] * b[i];
-        memory->weight[k][component] = along;
-        for (int i = 0; i < ALL; ++i) b[i] -= along * q[k][i];
+        if (fabs(q[i][0]) > largest) largest = fabs(q[i][0]);
     }
-    for (int k = 16 - 1; k >= 0; --k) {
-        double sum = memory->weight[k][component];
-        for (int j = k + 1; j < 16; ++j) sum -= r[k][j] * memory->weight[j][component];
-        memory->weight[k][component] = r[k][k] > 0.0 ? sum / r[k][k] : 0.0;
+    for (int k = 0; k < WINDOW; ++k) q[ROWS + k][k] = 1e-13 * largest;
+    for (int k = 0; k < WINDOW; ++k) {
+        for (int i = 0; i < ROWS + WINDOW; ++i)
+            for (int j = k; j < WINDOW + AHEAD; ++j) r[k][j] += q[i][k] * q[i][j];
+        const double scale = r[k][k] > 0.0 ? 1.0 / r[k][k] : 0.0;
+        for (int j = k + 1; j < WINDOW + AHEAD; ++j) r[k][j] *= scale;
+        for (int i = 0; i < ROWS + WINDOW; ++i)
+            for (int j = k + 1; j < WINDOW + AHEAD; ++j) q[i][j] -= q[i][k] * r[k][j];
     }
+    for (int l = 0; l < AHEAD; ++l)
+        for (int k = WINDOW - 1; k >= 0; --k) {
+            double sum = r[k][WINDOW + l];
+            for (int j = k + 1; j < WINDOW; ++j) sum -= r[k][j] * memory->weight[j][component][l];
+            memory->weight[k][component][l] = sum;
+        }
 }
 
-/* Take in the solved value: update both predictors and their errors, and fit the recurrence when steps have been
-   taking several iterations. */
-static void so4_manakov_remember(so4_manakov_memory *memory, const double value[6], int iterations)
+/* Add a value to the history. */
+static void so4_manakov_record(so4_manakov_memory *memory, const double value[6])
 {
-    for (int kind = 0; kind < 2; ++kind) {
-        double error = 0.0;
-        for (int i = 0; i < 6; ++i) error += fabs(value[i] - memory->predicted[kind][i]);
-        memory->error[kind] = fmax(0.8 * memory->error[kind], error);
-    }
-    so4_manakov_difference(memory, value);
-    if (memory->count == 160) {
-        memmove(memory->past, memory->past + 160 - 80, 80 * sizeof memory->past[0]);
-        memory->count = 80;
+    if (memory->count == 192) {
+        memmove(memory->past, memory->past + 192 - 96, 96 * sizeof memory->past[0]);
+        memory->count = 96;
     }
     memcpy(memory->past[memory->count++], value, 6 * sizeof value[0]);
-    memory->slow = iterations > 1 ? memory->slow + 1 : 0;
-    if (memory->slow >= 80 && memory->count >= 80) {
-        for (int i = 0; i < 6; ++i) so4_manakov_train(memory, i);
-        memory->trained = 1;
-        memory->error[1] = 0.0;
-        memory->slow = -80;
-    }
 }
 
-/* x + change in compensated arithmetic. 0, and x as before, if the sum is not finite. */
-static int so4_manakov_advance(so4_manakov_solver *s, const double change[6])
+/* Fit the recurrence to the last values; with every time, wait longer before it is done again. */
+static void so4_manakov_fit(so4_manakov_memory *memory)
+{
+    for (int i = 0; i < 6; ++i) so4_manakov_train(memory, i);
+    memory->fitting = 1;
+    ++memory->fits;
+    memory->slow = 0;
+    memory->patience = memory->patience < 10000 ? 2 * memory->patience + 96 : 20000;
+}
+
+/* Take in the solved value: what took one iteration needs no better guess. */
+static void so4_manakov_remember(so4_manakov_memory *memory, const double value[6], int iterations)
+{
+    if (iterations > 1) so4_manakov_judge(memory, value);
+    so4_manakov_record(memory, value);
+    memory->slow = iterations > 1 ? memory->slow + 1 : 0;
+    if (memory->slow > memory->patience && memory->count >= 96) so4_manakov_fit(memory);
+}
+
+/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last
+   bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the
+   sum is not finite. */
+static int so4_manakov_advance(so4_manakov_solver *s, const double change[6], const double correction[6])
 {
     double x[6], carry[6];
     for (int i = 0; i < 6; ++i) {
-        const double addend = change[i] + s->carry[i];
-        x[i] = s->x[i] + addend;
-        const double added = x[i] - s->x[i];
-        carry[i] = (s->x[i] - (x[i] - added)) + (addend - added);
+        const double sum = s->x[i] + change[i], added = sum - s->x[i];
+        const double lost = (s->x[i] - (sum - added)) + (change[i] - added);
+        const double small = lost + (s->carry[i] + correction[i]);
+        x[i] = sum + small;
+        carry[i] = small - (x[i] - sum);
         if (!isfinite(x[i])) return 0;
     }
     memcpy(s->x, x, sizeof x);
@@ -866,20 +876,19 @@ static double so4_manakov_size(const double y[6], const double delta[6])
 
 /* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the extrapolated guess, and advance. The
    increment is corrected to first order by the last Newton correction, so that correction costs no evaluation:
-   a correction is accepted when the error that remains after it, quadratic in it, is below 1e-18. */
+   a correction is accepted when the error that remains after it, quadratic in it, is below 1e-20. */
 static so4_manakov_status so4_manakov_attempt(so4_manakov_solver *s, int stage)
 {
     const double *coef = s->coef[stage];
     so4_manakov_memory *memory = &s->memory[stage];
     double y[6], delta[6], displacement[6], increment[6];
     double jacobian[36], increment_jacobian[36];
-    so4_manakov_predict(memory, y);
-    for (int i = 0; i < 6; ++i) y[i] += s->x[i];
+    if (!so4_manakov_predict(memory, y)) memcpy(y, s->x, sizeof y);
     double previous = HUGE_VAL;
     for (int iteration = 0; iteration < 20; ++iteration) {
         so4_manakov_linearise(coef, y, displacement, increment, jacobian, increment_jacobian);
         ++s->evaluations;
-        for (int i = 0; i < 6; ++i) delta[i] = ((y[i] - s->x[i]) - s->carry[i]) + displacement[i];
+        for (int i = 0; i < 6; ++i) delta[i] = ((y[i] - s->x[i]) + displacement[i]) - s->carry[i];
         const int regular = so4_manakov_solve(jacobian, delta);
         const double size = so4_manakov_size(y, delta);
         if (!isfinite(size)) return so4_manakov_NOT_FINITE;
@@ -888,14 +897,12 @@ static so4_manakov_status so4_manakov_attempt(so4_manakov_solver *s, int stage)
         const double growth = size / (previous * previous);
         const double remaining = size * size * (growth > 1.0 ? growth : 1.0);
         /* The second test: corrections no longer shrink, the solve has reached the level of rounding. */
-        if (remaining <= 1e-18 || (previous < 1e-8 && size > 0.25 * previous)) {
-            double offset[6];
-            for (int i = 0; i < 6; ++i) {
-                offset[i] = y[i] - s->x[i];
-                for (int j = 0; j < 6; ++j) increment[i] -= increment_jacobian[i * 6 + j] * delta[j];
-            }
-            if (!so4_manakov_advance(s, increment)) return so4_manakov_NOT_FINITE;
-            so4_manakov_remember(memory, offset, iteration + 1);
+        if (remaining <= 1e-20 || (previous < 1e-8 && size > 0.25 * previous)) {
+            double correction[6] = { 0.0 };
+            for (int i = 0; i < 6; ++i)
+                for (int j = 0; j < 6; ++j) correction[i] -= increment_jacobian[i * 6 + j] * delta[j];
+            if (!so4_manakov_advance(s, increment, correction)) return so4_manakov_NOT_FINITE;
+            so4_manakov_remember(memory, y, iteration + 1);
             return so4_manakov_OK;
         }
         previous = size;
@@ -912,7 +919,7 @@ static so4_manakov_status so4_manakov_stages(so4_manakov_solver *s)
     memcpy(carry, s->carry, sizeof carry);
     for (int stage = 0; stage < 1; ++stage) {
         so4_manakov_status status = so4_manakov_attempt(s, stage);
-        if (status != so4_manakov_OK && s->memory[stage].rows > 0) {
+        if (status != so4_manakov_OK && s->memory[stage].count > 0) {
             memset(&s->memory[stage], 0, sizeof s->memory[stage]);
             status = so4_manakov_attempt(s, stage);
         }
@@ -1100,11 +1107,841 @@ so4_manakov_status so4_manakov_step(so4_manakov_solver *s, double h)
     return status;
 }
 
+/*
+ * Eight at a time: below, the formulas of a step are evaluated for 8 steps of a trajectory, or members of an
+ * ensemble, at once. Compilers make vector instructions of the loops over lanes.
+ */
+enum { so4_manakov_LANES = 8 };
+
+#if defined(__GNUC__)
+typedef double so4_manakov_lanes[so4_manakov_LANES] __attribute__((aligned(64))); /* a value in each lane */
+#else
+typedef double so4_manakov_lanes[so4_manakov_LANES];
+#endif
+
+#if defined(__clang__)
+#define so4_manakov_EACH_LANE _Pragma("clang loop vectorize(assume_safety)")
+#pragma clang diagnostic ignored "-Wpass-failed"
+#elif defined(__GNUC__)
+#define so4_manakov_EACH_LANE _Pragma("GCC ivdep") _Pragma("GCC unroll 1")
+#else
+#define so4_manakov_EACH_LANE
+#endif
+
+/* What all blocks share: coefficients, the same in each lane, and the recurrences by which they are foreseen. */
+typedef struct {
+    int fits[1]; /* the fit that weight is of; -1 for none */
+    so4_manakov_lanes coef[1][32], weight[1][32][6];
+} so4_manakov_table;
+
+/* A stage in all lanes, linear around y: a residual r of alpha(y) = x takes inverse r from y and gain r from the
+   increment. */
+typedef struct {
+    so4_manakov_lanes y[6], displacement[6], increment[6], residual[6];
+    so4_manakov_lanes inverse[36], slope[36], gain[36];
+} so4_manakov_lines;
+
+/* so4_manakov_phi0 for the loops over lanes: no branches. Infinite beyond |s| = 4.0. */
+static inline double so4_manakov_phi0_lane(double s)
+{
+    double sum = 1.455172475614865e-27;
+    sum = sum * s + 5.744790668872202e-26;
+    sum = sum * s + 2.267952452337683e-24;
+    sum = sum * s + 8.953517427037546e-23;
+    sum = sum * s + 3.534707039629467e-21;
+    sum = sum * s + 1.3954464685812522e-19;
+    sum = sum * s + 5.5090028283602295e-18;
+    sum = sum * s + 2.174868698558062e-16;
+    sum = sum * s + 8.586062056277845e-15;
+    sum = sum * s + 3.3896802963225827e-13;
+    sum = sum * s + 1.3382536530684679e-11;
+    sum = sum * s + 5.284190138687493e-10;
+    sum = sum * s + 2.08767569878681e-08;
+    sum = sum * s + 8.267195767195768e-07;
+    sum = sum * s + 3.306878306878307e-05;
+    sum = sum * s + 0.001388888888888889;
+    sum = sum * s + 0.08333333333333333;
+    return sum + (fabs(s) <= 4.0 ? 0.0 : HUGE_VAL);
+}
+
+/* so4_manakov_phi1 for the loops over lanes: no branches. Infinite beyond |s| = 4.0. */
+static inline double so4_manakov_phi1_lane(double s)
+{
+    double sum = 6.266191399131027e-28;
+    sum = sum * s + 2.328275960983784e-26;
+    sum = sum * s + 8.617186003308303e-25;
+    sum = sum * s + 3.1751334332727565e-23;
+    sum = sum * s + 1.163957265514881e-21;
+    sum = sum * s + 4.241648447555361e-20;
+    sum = sum * s + 1.5349911154393775e-18;
+    sum = sum * s + 5.5090028283602297e-17;
+    sum = sum * s + 1.9573818287022555e-15;
+    sum = sum * s + 6.868849645022276e-14;
+    sum = sum * s + 2.372776207425808e-12;
+    sum = sum * s + 8.029521918410807e-11;
+    sum = sum * s + 2.6420950693437467e-09;
+    sum = sum * s + 8.35070279514724e-08;
+    sum = sum * s + 2.48015873015873e-06;
+    sum = sum * s + 6.613756613756614e-05;
+    sum = sum * s + 0.001388888888888889;
+    return sum + (fabs(s) <= 4.0 ? 0.0 : HUGE_VAL);
+}
+
+/* so4_manakov_linearise_lanes_part1 (part 1 of 3) */
+so4_manakov_APART static void so4_manakov_linearise_lanes_part1(so4_manakov_lanes coef[restrict 32],
+                                                                so4_manakov_lanes y[restrict 6],
+                                                                so4_manakov_lanes displacement[restrict 6],
+                                                                so4_manakov_lanes increment[restrict 6],
+                                                                so4_manakov_lanes jacobian[restrict 36],
+                                                                so4_manakov_lanes increment_jacobian[restrict 36],
+                                                                so4_manakov_lanes work[restrict 130])
+{
+    (void)jacobian;
+    (void)increment_jacobian;
+    so4_manakov_EACH_LANE
+    for (int lane = 0; lane < so4_manakov_LANES; ++lane) {
+        const double x12 = y[0][lane];
+        const double x13 = y[1][lane];
+        const double x14 = y[2][lane];
+        const double x23 = y[3][lane];
+        const double x24 = y[4][lane];
+        const double x34 = y[5][lane];
+        const double t1 = x14 * x23;
+        const double t2 = x13 * x24;
+        work[7][lane] = coef[0][lane] * t1 + coef[1][lane] * t2;
+        const double t4 = x24 * x24;
+        const double t5 = x23 * x23;
+        const double t6 = x14 * x14;
+        const double t7 = x13 * x13;
+        work[11][lane] = coef[3][lane] * t4 + (coef[4][lane] * t5 + coef[5][lane] * t6 + (coef[2][lane] + coef[6][lane] * t7));
+        work[119][lane] = x34 * work[7][lane] + x12 * work[11][lane];
+        work[46][lane] = coef[18][lane] * t4 + (coef[19][lane] + coef[9][lane] * t7 + (coef[13][lane] * t6 + coef[15][lane] * t5));
+        work[118][lane] = x12 * work[7][lane] + x34 * work[46][lane];
+        const double t10 = 2.0 * work[118][lane];
+        const double t11 = work[119][lane] + t10;
+        const double t12 = x12 * x34;
+        work[27][lane] = coef[7][lane] * t1 + coef[1][lane] * t12;
+        const double t14 = x34 * x34;
+        const double t15 = x12 * x12;
+        work[28][lane] = coef[9][lane] * t14 + (coef[8][lane] + coef[6][lane] * t15 + (coef[10][lane] * t5 + coef[11][lane] * t6));
+        work[110][lane] = x24 * work[27][lane] + x13 * work[28][lane];
+        work[43][lane] = coef[18][lane] * t14 + (coef[16][lane] * t5 + coef[14][lane] * t6 + (coef[17][lane] + coef[3][lane] * t15));
+        work[109][lane] = x13 * work[27][lane] + x24 * work[43][lane];
+        const double t18 = 2.0 * work[109][lane];
+        const double t19 = work[110][lane] - t18;
+        work[35][lane] = coef[7][lane] * t2 + coef[0][lane] * t12;
+        work[39][lane] = coef[15][lane] * t14 + (coef[16][lane] * t4 + coef[10][lane] * t7 + (coef[12][lane] + coef[4][lane] * t15));
+        work[108][lane] = x14 * work[35][lane] + x23 * work[39][lane];
+        const double t22 = work[118][lane] * work[118][lane] + (work[109][lane] * work[109][lane] + work[108][lane] * work[108][lane]);
+        work[34][lane] = coef[13][lane] * t14 + (coef[14][lane] * t4 + coef[11][lane] * t7 + (coef[12][lane] + coef[5][lane] * t15));
+        work[111][lane] = x23 * work[35][lane] + x14 * work[34][lane];
+        const double t24 = 2.0 * work[108][lane];
+        const double t25 = work[111][lane] + t24;
+        const double t26 = work[119][lane] * t11 + (work[110][lane] * t19 + (t22 + work[111][lane] * t25));
+        work[23][lane] = so4_manakov_phi0_lane(t26);
+        work[33][lane] = 0.5 * work[109][lane];
+        work[38][lane] = 0.5 * work[110][lane];
+        work[22][lane] = work[33][lane] - work[38][lane];
+        work[47][lane] = work[38][lane] - work[33][lane];
+        work[86][lane] = 0.5 * work[119][lane];
+        work[85][lane] = 0.5 * work[118][lane];
+        work[21][lane] = work[86][lane] + work[85][lane];
+        const double t35 = x34 * work[47][lane] + x24 * work[21][lane] + (x12 * work[47][lane] - x13 * work[21][lane]);
+        const double t36 = work[22][lane] * t35;
+        work[26][lane] = 0.5 * work[108][lane];
+        work[42][lane] = 0.5 * work[111][lane];
+        work[30][lane] = work[26][lane] + work[42][lane];
+        const double t40 = x23 * work[21][lane];
+        const double t41 = x34 * work[30][lane];
+        const double t42 = x14 * work[21][lane];
+        const double t43 = x12 * work[30][lane];
+        const double t44 = t40 - t41 + (t42 - t43);
+        const double t45 = t43 - t42 + (t41 - t40);
+        const double t46 = t36 + work[30][lane] * t44 + (t36 - work[30][lane] * t45);
+        const double t47 = work[23][lane] * t46;
+        const double t48 = work[119][lane] - t10;
+        const double t49 = work[110][lane] + t18;
+        const double t50 = work[111][lane] - t24;
+        const double t51 = work[119][lane] * t48 + (work[110][lane] * t49 + (t22 + work[111][lane] * t50));
+        work[1][lane] = so4_manakov_phi0_lane(t51);
+        work[18][lane] = work[38][lane] + work[33][lane];
+        const double t54 = x34 * work[18][lane];
+        work[19][lane] = work[86][lane] - work[85][lane];
+        const double t56 = x12 * work[18][lane];
+        const double t57 = t54 + x24 * work[19][lane] + (x13 * work[19][lane] - t56);
+        const double t58 = work[18][lane] * t57;
+        work[29][lane] = work[26][lane] - work[42][lane];
+        work[20][lane] = work[85][lane] - work[86][lane];
+        work[52][lane] = work[42][lane] - work[26][lane];
+        const double t62 = x14 * work[20][lane] + x12 * work[52][lane] + (x34 * work[29][lane] + x23 * work[19][lane]);
+        const double t63 = work[29][lane] * t62;
+        const double t64 = t56 + x13 * work[20][lane] + (x24 * work[20][lane] - t54);
+        const double t65 = work[18][lane] * t64;
+        work[4][lane] = t58 + t63 + (t63 - t65);
+        const double t67 = x13 * work[108][lane] + x14 * work[109][lane] - (x23 * work[110][lane] + x24 * work[111][lane]);
+        const double t68 = x23 * work[18][lane];
+        const double t69 = x14 * work[18][lane];
+        work[71][lane] = t68 + x24 * work[52][lane] + (x13 * work[52][lane] - t69);
+        work[70][lane] = x24 * work[29][lane] - t68 + (x13 * work[29][lane] + t69);
+        work[55][lane] = work[29][lane] * work[71][lane] + work[19][lane] * t64 + (work[52][lane] * work[70][lane] + work[20][lane] * t57);
+        const double t73 = work[1][lane] * work[55][lane];
+        const double t74 = work[21][lane] * t35;
+        work[69][lane] = x14 * work[22][lane] + x13 * work[30][lane] + (x23 * work[22][lane] - x24 * work[30][lane]);
+        const double t76 = work[30][lane] * work[69][lane];
+        const double t77 = t74 - t76;
+        work[58][lane] = t77 + t77;
+        const double t79 = x23 * work[119][lane] - x34 * work[111][lane] + (x14 * work[118][lane] - x12 * work[108][lane]);
+        const double t80 = work[19][lane] * t62;
+        const double t81 = work[18][lane] * work[70][lane];
+        const double t82 = work[18][lane] * work[71][lane];
+        work[90][lane] = t80 - t81 + (t80 + t82);
+        const double t84 = work[47][lane] * work[69][lane];
+        work[89][lane] = t84 + work[21][lane] * t45 + (t84 - work[21][lane] * t44);
+        const double t86 = work[23][lane] * work[89][lane];
+        const double t87 = x34 * work[110][lane] + x24 * work[119][lane] - (x13 * work[118][lane] + x12 * work[109][lane]);
+        const double t88 = work[20][lane] * t62;
+        work[98][lane] = t88 - t82 + (t81 + t88);
+        const double t90 = x12 * work[110][lane] - x13 * work[119][lane] + (x24 * work[118][lane] - x34 * work[109][lane]);
+        const double t91 = t76 - t74;
+        work[99][lane] = t91 + t91;
+        const double t93 = x12 * work[111][lane] - x14 * work[119][lane] + (x34 * work[108][lane] - x23 * work[118][lane]);
+        const double t94 = work[52][lane] * t62;
+        work[101][lane] = t94 - t58 + (t65 + t94);
+        const double t96 = x13 * work[111][lane] - x14 * work[110][lane] + (x23 * work[109][lane] - x24 * work[108][lane]);
+        work[97][lane] = work[22][lane] * work[47][lane];
+        work[84][lane] = work[30][lane] * work[30][lane];
+        const double t99 = work[97][lane] - work[84][lane];
+        work[45][lane] = (t99 + t99) * work[23][lane];
+        work[83][lane] = work[52][lane] * work[29][lane];
+        work[44][lane] = work[18][lane] * work[18][lane];
+        const double t103 = work[83][lane] - work[44][lane];
+        work[6][lane] = work[45][lane] + (t103 + t103) * work[1][lane];
+        work[67][lane] = 0.5 * x14;
+        work[78][lane] = 0.5 * x23;
+        work[51][lane] = work[67][lane] - work[78][lane];
+        const double t108 = work[51][lane] * work[29][lane];
+        work[68][lane] = 0.5 * x13;
+        work[0][lane] = 0.5 * x24;
+        work[64][lane] = work[68][lane] + work[0][lane];
+        work[95][lane] = work[64][lane] * work[18][lane];
+        work[62][lane] = (-0.5) * x13 - work[0][lane];
+        work[96][lane] = work[62][lane] * work[18][lane];
+        const double t115 = 2.0 * work[119][lane];
+        const double t116 = so4_manakov_phi1_lane(t51);
+        work[61][lane] = (t10 - t115) * t116;
+        work[59][lane] = work[0][lane] - work[68][lane];
+        const double t119 = work[59][lane] * work[22][lane];
+        work[91][lane] = (-0.5) * x23 - work[67][lane];
+        work[88][lane] = work[78][lane] + work[67][lane];
+        work[49][lane] = work[88][lane] * work[30][lane];
+        const double t123 = (t119 - work[91][lane] * work[30][lane] + (t119 + work[49][lane])) * work[23][lane];
+        const double t124 = so4_manakov_phi1_lane(t26);
+        work[66][lane] = (t115 + t10) * t124;
+        work[100][lane] = t123 + t46 * work[66][lane];
+        work[8][lane] = (t108 - work[95][lane] + (work[96][lane] + t108)) * work[1][lane] + work[61][lane] * work[4][lane] + work[100][lane];
+        work[25][lane] = x12 * x24;
+        work[24][lane] = x13 * x34;
+        work[9][lane] = coef[23][lane] * work[25][lane] + coef[1][lane] * work[24][lane];
+        work[75][lane] = 0.5 * x34;
+        work[48][lane] = (-0.5) * x12 - work[75][lane];
+        work[60][lane] = 0.5 * t35;
+        const double t134 = work[48][lane] * work[22][lane] + work[60][lane];
+        const double t135 = 2.0 * work[110][lane];
+        work[57][lane] = (t18 - t135) * t124;
+        work[104][lane] = work[23][lane] * (t134 + t134) + t46 * work[57][lane];
+        work[73][lane] = 0.5 * x12;
+        work[50][lane] = work[75][lane] - work[73][lane];
+        work[63][lane] = 0.5 * t57;
+        work[103][lane] = work[50][lane] * work[18][lane] + work[63][lane];
+        work[53][lane] = work[73][lane] - work[75][lane];
+        work[65][lane] = 0.5 * t64;
+        work[102][lane] = work[53][lane] * work[18][lane] + work[65][lane];
+        const double t145 = work[1][lane] * (work[103][lane] - work[102][lane]);
+        work[56][lane] = (t135 + t18) * t116;
+        work[10][lane] = work[104][lane] + (t145 + work[4][lane] * work[56][lane]) - work[67][lane];
+        work[87][lane] = work[78][lane] - work[67][lane];
+        work[54][lane] = work[87][lane] * work[29][lane];
+        work[81][lane] = (work[119][lane] + t48) * t116;
+        work[82][lane] = (work[119][lane] + t11) * t124;
+        work[105][lane] = t123 + t46 * work[82][lane];
+        work[12][lane] = (work[54][lane] - work[96][lane] + (work[54][lane] + work[95][lane])) * work[1][lane] + work[4][lane] * work[81][lane] + work[105][lane];
+        work[40][lane] = x12 * x13;
+        work[41][lane] = x24 * x34;
+        work[13][lane] = coef[20][lane] * work[40][lane] + coef[1][lane] * work[41][lane];
+        work[79][lane] = (work[110][lane] + t49) * t116;
+        work[77][lane] = work[75][lane] + work[73][lane];
+        const double t159 = work[77][lane] * work[22][lane] - work[60][lane];
+        work[80][lane] = (work[110][lane] + t19) * t124;
+        work[106][lane] = work[23][lane] * (t159 + t159) + t46 * work[80][lane];
+        work[14][lane] = work[78][lane] + (work[4][lane] * work[79][lane] + t145 + work[106][lane]);
+        work[31][lane] = x12 * x23;
+        work[32][lane] = x14 * x34;
+        work[15][lane] = coef[22][lane] * work[31][lane] + coef[0][lane] * work[32][lane];
+        work[93][lane] = 0.5 * t44;
+        work[92][lane] = 0.5 * t45;
+        const double t168 = work[23][lane] * (work[48][lane] * work[30][lane] + work[93][lane] - (work[77][lane] * work[30][lane] + work[92][lane]));
+        const double t169 = 2.0 * work[111][lane];
+        work[74][lane] = (t169 + t24) * t124;
+        work[107][lane] = t168 + t46 * work[74][lane];
+        work[94][lane] = 0.5 * t62;
+        const double t173 = work[50][lane] * work[29][lane] + work[94][lane];
+        work[72][lane] = (t24 - t169) * t116;
+        work[16][lane] = work[107][lane] + (work[1][lane] * (t173 + t173) + work[4][lane] * work[72][lane]) - work[68][lane];
+        work[37][lane] = x23 * x34;
+        work[36][lane] = x12 * x14;
+        work[17][lane] = coef[0][lane] * work[37][lane] + coef[21][lane] * work[36][lane];
+        work[2][lane] = work[53][lane] * work[29][lane] - work[94][lane];
+        work[3][lane] = (work[111][lane] + t50) * t116;
+        work[76][lane] = (work[111][lane] + t25) * t124;
+        work[5][lane] = t168 + t46 * work[76][lane];
+        displacement[0][lane] = t47 + work[1][lane] * work[4][lane] - 0.5 * t67;
+        increment[0][lane] = t67;
+        displacement[1][lane] = t73 + work[23][lane] * work[58][lane] - 0.5 * t79;
+        increment[1][lane] = t79;
+        displacement[2][lane] = work[1][lane] * work[90][lane] + t86 - 0.5 * t87;
+        increment[2][lane] = t87;
+        displacement[3][lane] = work[1][lane] * work[98][lane] + t86 - 0.5 * t90;
+        increment[3][lane] = t90;
+        displacement[4][lane] = work[23][lane] * work[99][lane] + t73 - 0.5 * t93;
+        increment[4][lane] = t93;
+        displacement[5][lane] = t47 + work[1][lane] * work[101][lane] - 0.5 * t96;
+        increment[5][lane] = t96;
+    }
+}
+
+/* so4_manakov_linearise_lanes_part2 (part 2 of 3) */
+so4_manakov_APART static void so4_manakov_linearise_lanes_part2(so4_manakov_lanes coef[restrict 32],
+                                                                so4_manakov_lanes y[restrict 6],
+                                                                so4_manakov_lanes displacement[restrict 6],
+                                                                so4_manakov_lanes increment[restrict 6],
+                                                                so4_manakov_lanes jacobian[restrict 36],
+                                                                so4_manakov_lanes increment_jacobian[restrict 36],
+                                                                so4_manakov_lanes work[restrict 130])
+{
+    (void)displacement;
+    (void)increment;
+    so4_manakov_EACH_LANE
+    for (int lane = 0; lane < so4_manakov_LANES; ++lane) {
+        const double x13 = y[1][lane];
+        const double x14 = y[2][lane];
+        const double x23 = y[3][lane];
+        const double x24 = y[4][lane];
+        const double t183 = work[0][lane] + (work[1][lane] * (work[2][lane] + work[2][lane]) + work[3][lane] * work[4][lane] + work[5][lane]);
+        const double t184 = work[18][lane] * work[19][lane];
+        const double t185 = work[18][lane] * work[20][lane];
+        const double t186 = (t184 - t185) * work[1][lane];
+        const double t187 = work[21][lane] * work[22][lane];
+        const double t188 = (t187 + t187) * work[23][lane];
+        work[114][lane] = coef[26][lane] * work[24][lane] + coef[1][lane] * work[25][lane];
+        const double t190 = x13 * x14;
+        const double t191 = x23 * x24;
+        work[115][lane] = coef[24][lane] * t190 + coef[7][lane] * t191;
+        const double t193 = x13 * x23;
+        const double t194 = x14 * x24;
+        work[116][lane] = coef[25][lane] * t193 + coef[7][lane] * t194;
+        const double t196 = work[20][lane] * work[29][lane];
+        const double t197 = work[30][lane] * work[21][lane];
+        const double t198 = (t197 + t197) * work[23][lane];
+        const double t199 = (t196 + t196) * work[1][lane] + t198;
+        work[113][lane] = coef[0][lane] * work[31][lane] + coef[28][lane] * work[32][lane];
+        work[121][lane] = coef[7][lane] * t193 + coef[27][lane] * t194;
+        const double t202 = work[19][lane] * work[29][lane];
+        const double t203 = t198 + (t202 + t202) * work[1][lane];
+        work[112][lane] = coef[0][lane] * work[36][lane] + coef[30][lane] * work[37][lane];
+        work[120][lane] = coef[7][lane] * t190 + coef[29][lane] * t191;
+        work[123][lane] = coef[1][lane] * work[40][lane] + coef[31][lane] * work[41][lane];
+        const double t207 = work[44][lane] + work[29][lane] * work[29][lane];
+        const double t208 = work[45][lane] + (t207 + t207) * work[1][lane] + (work[46][lane] * work[8][lane] + work[123][lane] * work[10][lane] + (work[113][lane] * t183 + work[112][lane] * work[16][lane] + (work[7][lane] * work[12][lane] + work[114][lane] * work[14][lane])));
+        const double t209 = work[21][lane] * work[47][lane];
+        const double t210 = (t209 + t209) * work[23][lane];
+        const double t211 = work[48][lane] * work[21][lane];
+        const double t212 = t211 - work[49][lane];
+        const double t213 = work[50][lane] * work[20][lane];
+        const double t214 = work[51][lane] * work[52][lane];
+        const double t215 = work[53][lane] * work[19][lane];
+        const double t216 = (t213 + t214 + (work[54][lane] + t215)) * work[1][lane];
+        const double t217 = t216 + work[55][lane] * work[56][lane];
+        const double t218 = (t212 + t212) * work[23][lane] + work[57][lane] * work[58][lane] + t217;
+        const double t219 = work[59][lane] * work[21][lane] + work[60][lane];
+        const double t220 = work[23][lane] * (t219 + t219);
+        const double t221 = work[61][lane] * work[55][lane] + work[1][lane] * (work[62][lane] * work[20][lane] + work[63][lane] + (work[64][lane] * work[19][lane] - work[65][lane]));
+        const double t222 = t220 + work[66][lane] * work[58][lane] + t221 - work[67][lane];
+        const double t223 = work[68][lane] - work[0][lane];
+        const double t224 = 0.5 * work[69][lane];
+        const double t225 = t223 * work[30][lane] + t224;
+        const double t226 = work[23][lane] * (t225 + t225);
+        const double t227 = 0.5 * work[70][lane];
+        const double t228 = 0.5 * work[71][lane];
+        const double t229 = work[72][lane] * work[55][lane] + work[1][lane] * (work[64][lane] * work[52][lane] - t227 + (work[62][lane] * work[29][lane] + t228));
+        const double t230 = work[73][lane] + (work[74][lane] * work[58][lane] - t226 + t229);
+        const double t231 = (-0.5) * x24 - work[68][lane];
+        const double t232 = work[3][lane] * work[55][lane] + work[1][lane] * (t231 * work[52][lane] + t227 + (work[64][lane] * work[29][lane] - t228));
+        const double t233 = work[75][lane] + (t232 + (work[58][lane] * work[76][lane] - t226));
+        const double t234 = work[77][lane] * work[21][lane];
+        const double t235 = (-0.5) * x14 - work[78][lane];
+        const double t236 = t235 * work[30][lane];
+        const double t237 = t234 - t236;
+        const double t238 = t216 + work[79][lane] * work[55][lane];
+        const double t239 = (t237 + t237) * work[23][lane] + work[80][lane] * work[58][lane] + t238;
+        const double t240 = work[55][lane] * work[81][lane] + work[1][lane] * (work[64][lane] * work[20][lane] - work[63][lane] + (work[62][lane] * work[19][lane] + work[65][lane]));
+        const double t241 = t220 + work[82][lane] * work[58][lane] + t240 - work[78][lane];
+        const double t242 = work[20][lane] * work[19][lane];
+        const double t243 = t242 + work[83][lane];
+        const double t244 = (t243 + t243) * work[1][lane];
+        const double t245 = work[21][lane] * work[21][lane];
+        const double t246 = work[84][lane] + t245;
+        const double t247 = (t246 + t246) * work[23][lane];
+        const double t248 = t244 - t247;
+        const double t249 = work[18][lane] * work[52][lane];
+        const double t250 = work[18][lane] * work[29][lane];
+        const double t251 = (t249 - t250) * work[1][lane];
+        const double t252 = work[30][lane] * work[22][lane];
+        const double t253 = (t252 + t252) * work[23][lane];
+        const double t254 = (t250 - t249) * work[1][lane];
+        const double t255 = t244 + t247;
+        const double t256 = (t185 - t184) * work[1][lane];
+        const double t257 = work[52][lane] * work[19][lane];
+        const double t258 = t198 + (t257 + t257) * work[1][lane];
+        const double t259 = work[87][lane] * work[18][lane] + t228;
+        const double t260 = work[51][lane] * work[18][lane] + t227;
+        const double t261 = work[1][lane] * (t259 - t260);
+        const double t262 = work[88][lane] * work[47][lane] - t224;
+        const double t263 = work[89][lane] * work[57][lane] + work[23][lane] * (t262 + t262);
+        const double t264 = work[73][lane] + (work[90][lane] * work[56][lane] + t261 + t263);
+        const double t265 = work[23][lane] * (work[91][lane] * work[21][lane] + work[92][lane] - (work[88][lane] * work[21][lane] + work[93][lane]));
+        const double t266 = work[89][lane] * work[66][lane] + t265;
+        const double t267 = work[51][lane] * work[19][lane] - work[94][lane];
+        const double t268 = work[68][lane] + (t266 + (work[61][lane] * work[90][lane] + work[1][lane] * (t267 + t267)));
+        const double t269 = t231 * work[18][lane];
+        const double t270 = t223 * work[47][lane];
+        const double t271 = (t270 - t211 + (t270 + t234)) * work[23][lane];
+        const double t272 = t271 + work[89][lane] * work[76][lane];
+        const double t273 = (t215 + work[95][lane] + (t215 - t269)) * work[1][lane] + work[3][lane] * work[90][lane] + t272;
+        const double t274 = t271 + work[89][lane] * work[74][lane];
+        const double t275 = work[50][lane] * work[19][lane];
+        const double t276 = t274 + ((t275 - work[95][lane] + (work[96][lane] + t275)) * work[1][lane] + work[72][lane] * work[90][lane]);
+        const double t277 = t235 * work[47][lane] + t224;
+        const double t278 = work[23][lane] * (t277 + t277) + work[89][lane] * work[80][lane];
+        const double t279 = work[79][lane] * work[90][lane] + t261 + t278 - work[75][lane];
+        const double t280 = work[87][lane] * work[19][lane] + work[94][lane];
+        const double t281 = t265 + work[89][lane] * work[82][lane];
+        const double t282 = work[90][lane] * work[81][lane] + work[1][lane] * (t280 + t280) + t281 - work[0][lane];
+        const double t283 = work[30][lane] * work[47][lane];
+        const double t284 = (t283 + t283) * work[23][lane];
+        const double t285 = t242 - work[44][lane];
+        const double t286 = work[97][lane] - t245;
+        const double t287 = (t286 + t286) * work[23][lane];
+        const double t288 = (t285 + t285) * work[1][lane] + t287;
+        const double t289 = work[19][lane] * work[19][lane] + work[44][lane];
+        const double t290 = (t289 + t289) * work[1][lane] + t287 + (work[120][lane] * t264 + work[112][lane] * t268 + (work[35][lane] * t273 + work[39][lane] * t276 + (work[15][lane] * t282 + work[116][lane] * t279)));
+        const double t291 = work[20][lane] * work[52][lane];
+        const double t292 = t198 + (t291 + t291) * work[1][lane];
+        const double t293 = work[1][lane] * (t260 - t259);
+        const double t294 = work[75][lane] + (t263 + (work[98][lane] * work[56][lane] + t293));
+        const double t295 = work[51][lane] * work[20][lane] + work[94][lane];
+        const double t296 = work[1][lane] * (t295 + t295) + work[98][lane] * work[61][lane] + t266 - work[0][lane];
+        const double t297 = work[53][lane] * work[20][lane];
+        const double t298 = t272 + ((t297 - work[95][lane] + (t297 + t269)) * work[1][lane] + work[98][lane] * work[3][lane]);
+        const double t299 = (t213 - work[96][lane] + (t213 + work[95][lane])) * work[1][lane] + work[98][lane] * work[72][lane] + t274;
+        const double t300 = work[87][lane] * work[20][lane] - work[94][lane];
+        const double t301 = work[68][lane] + (t281 + (work[98][lane] * work[81][lane] + work[1][lane] * (t300 + t300)));
+        const double t302 = work[98][lane] * work[79][lane] + t293 + t278 - work[73][lane];
+        const double t303 = work[20][lane] * work[20][lane] + work[44][lane];
+        const double t304 = (t303 + t303) * work[1][lane] + t287 + (work[113][lane] * t296 + work[121][lane] * t294 + (work[34][lane] * t298 + work[35][lane] * t299 + (work[17][lane] * t301 + work[115][lane] * t302)));
+        const double t305 = work[49][lane] - t211;
+        const double t306 = t217 + ((t305 + t305) * work[23][lane] + work[99][lane] * work[57][lane]);
+        const double t307 = work[78][lane] + (work[99][lane] * work[66][lane] - t220 + t221);
+        const double t308 = t236 - t234;
+        const double t309 = t238 + ((t308 + t308) * work[23][lane] + work[99][lane] * work[80][lane]);
+        const double t310 = work[67][lane] + (work[99][lane] * work[82][lane] - t220 + t240);
+        const double t311 = work[99][lane] * work[74][lane] + t226 + t229 - work[75][lane];
+        const double t312 = t226 + work[99][lane] * work[76][lane] + t232 - work[73][lane];
+        const double t313 = work[52][lane] * work[52][lane] + work[44][lane];
+        const double t314 = work[100][lane] + ((t214 + work[95][lane] + (t214 - work[96][lane])) * work[1][lane] + work[101][lane] * work[61][lane]);
+        const double t315 = work[1][lane] * (work[102][lane] - work[103][lane]);
+        const double t316 = t315 + work[101][lane] * work[56][lane] + work[104][lane] - work[78][lane];
+        const double t317 = work[87][lane] * work[52][lane];
+        const double t318 = (t317 - work[95][lane] + (t317 + work[96][lane])) * work[1][lane] + work[101][lane] * work[81][lane] + work[105][lane];
+        const double t319 = work[67][lane] + (work[106][lane] + (work[101][lane] * work[79][lane] + t315));
+        const double t320 = work[50][lane] * work[52][lane] - work[94][lane];
+        const double t321 = work[0][lane] + (work[107][lane] + (work[101][lane] * work[72][lane] + work[1][lane] * (t320 + t320)));
+        const double t322 = work[53][lane] * work[52][lane] + work[94][lane];
+        const double t323 = work[101][lane] * work[3][lane] + work[1][lane] * (t322 + t322) + work[5][lane] - work[68][lane];
+        const double t324 = (t313 + t313) * work[1][lane] + work[45][lane] + (work[7][lane] * t314 + work[9][lane] * t316 + (work[11][lane] * t318 + work[13][lane] * t319 + (work[15][lane] * t321 + work[17][lane] * t323)));
+        work[129][lane] = x14 * work[9][lane];
+        work[127][lane] = x13 * work[15][lane];
+        work[124][lane] = x24 * work[17][lane];
+        work[117][lane] = x23 * work[13][lane];
+        const double t329 = x14 * work[27][lane];
+        const double t330 = x13 * work[35][lane];
+        const double t331 = x24 * work[35][lane];
+        const double t332 = x23 * work[27][lane];
+        work[122][lane] = x14 * work[123][lane];
+        work[125][lane] = x13 * work[112][lane];
+        work[126][lane] = x24 * work[113][lane];
+        work[128][lane] = x23 * work[114][lane];
+        jacobian[0][lane] = 1.0 + (work[6][lane] + (work[7][lane] * work[8][lane] + work[9][lane] * work[10][lane] + (work[11][lane] * work[12][lane] + work[13][lane] * work[14][lane] + (work[15][lane] * work[16][lane] + work[17][lane] * t183))));
+        jacobian[1][lane] = t186 - t188 - work[26][lane] + (work[114][lane] * work[8][lane] + work[27][lane] * work[10][lane] + (work[115][lane] * t183 + work[116][lane] * work[16][lane] + (work[13][lane] * work[12][lane] + work[28][lane] * work[14][lane])));
+        jacobian[2][lane] = t199 - work[33][lane] + (work[113][lane] * work[8][lane] + work[121][lane] * work[10][lane] + (work[34][lane] * t183 + work[35][lane] * work[16][lane] + (work[17][lane] * work[12][lane] + work[115][lane] * work[14][lane])));
+        jacobian[3][lane] = work[38][lane] + t203 + (work[112][lane] * work[8][lane] + work[120][lane] * work[10][lane] + (work[39][lane] * work[16][lane] + work[35][lane] * t183 + (work[15][lane] * work[12][lane] + work[116][lane] * work[14][lane])));
+        jacobian[4][lane] = work[42][lane] + (t186 + t188) + (work[123][lane] * work[8][lane] + work[43][lane] * work[10][lane] + (work[9][lane] * work[12][lane] + work[27][lane] * work[14][lane] + (work[120][lane] * work[16][lane] + work[121][lane] * t183)));
+        jacobian[5][lane] = t208;
+        jacobian[6][lane] = work[26][lane] + (t186 + t210) + (work[9][lane] * t218 + work[7][lane] * t222 + (work[15][lane] * t230 + work[17][lane] * t233 + (work[13][lane] * t239 + work[11][lane] * t241)));
+        jacobian[7][lane] = 1.0 + (t248 + (work[27][lane] * t218 + work[114][lane] * t222 + (work[28][lane] * t239 + work[13][lane] * t241 + (work[115][lane] * t233 + work[116][lane] * t230))));
+        jacobian[8][lane] = t251 - t253 - work[85][lane] + (work[121][lane] * t218 + work[113][lane] * t222 + (work[34][lane] * t233 + work[35][lane] * t230 + (work[115][lane] * t239 + work[17][lane] * t241)));
+        jacobian[9][lane] = t254 - t253 - work[86][lane] + (work[120][lane] * t218 + work[112][lane] * t222 + (work[116][lane] * t239 + work[15][lane] * t241 + (work[39][lane] * t230 + work[35][lane] * t233)));
+        jacobian[10][lane] = t255 + (work[43][lane] * t218 + work[123][lane] * t222 + (work[120][lane] * t230 + work[121][lane] * t233 + (work[27][lane] * t239 + work[9][lane] * t241)));
+        jacobian[11][lane] = work[42][lane] + (t210 + t256) + (work[123][lane] * t218 + work[46][lane] * t222 + (work[114][lane] * t239 + work[7][lane] * t241 + (work[113][lane] * t233 + work[112][lane] * t230)));
+        jacobian[12][lane] = work[33][lane] + t258 + (work[9][lane] * t264 + work[7][lane] * t268 + (work[17][lane] * t273 + work[15][lane] * t276 + (work[13][lane] * t279 + work[11][lane] * t282)));
+        jacobian[17][lane] = t203 - work[38][lane] + (work[123][lane] * t264 + work[46][lane] * t268 + (work[112][lane] * t276 + work[113][lane] * t273 + (work[114][lane] * t279 + work[7][lane] * t282)));
+        jacobian[13][lane] = work[85][lane] + (t284 + t251) + (work[114][lane] * t268 + work[27][lane] * t264 + (work[115][lane] * t273 + work[116][lane] * t276 + (work[13][lane] * t282 + work[28][lane] * t279)));
+        jacobian[16][lane] = t251 - t284 - work[86][lane] + (work[43][lane] * t264 + work[123][lane] * t268 + (work[121][lane] * t273 + work[120][lane] * t276 + (work[27][lane] * t279 + work[9][lane] * t282)));
+        jacobian[14][lane] = 1.0 + (t288 + (work[113][lane] * t268 + work[121][lane] * t264 + (work[34][lane] * t273 + work[35][lane] * t276 + (work[115][lane] * t279 + work[17][lane] * t282))));
+        jacobian[15][lane] = t290;
+        jacobian[18][lane] = t292 - work[38][lane] + (work[9][lane] * t294 + work[7][lane] * t296 + (work[17][lane] * t298 + work[15][lane] * t299 + (work[11][lane] * t301 + work[13][lane] * t302)));
+        jacobian[19][lane] = work[86][lane] + (t284 + t254) + (work[114][lane] * t296 + work[27][lane] * t294 + (work[116][lane] * t299 + work[115][lane] * t298 + (work[13][lane] * t301 + work[28][lane] * t302)));
+        jacobian[21][lane] = 1.0 + (t288 + (work[112][lane] * t296 + work[120][lane] * t294 + (work[39][lane] * t299 + work[35][lane] * t298 + (work[15][lane] * t301 + work[116][lane] * t302))));
+        jacobian[22][lane] = t254 - t284 - work[85][lane] + (work[43][lane] * t294 + work[123][lane] * t296 + (work[121][lane] * t298 + work[120][lane] * t299 + (work[9][lane] * t301 + work[27][lane] * t302)));
+        jacobian[23][lane] = work[33][lane] + t199 + (work[46][lane] * t296 + work[123][lane] * t294 + (work[113][lane] * t298 + work[112][lane] * t299 + (work[7][lane] * t301 + work[114][lane] * t302)));
+        jacobian[20][lane] = t304;
+        jacobian[24][lane] = t186 - t210 - work[42][lane] + (work[9][lane] * t306 + work[7][lane] * t307 + (work[13][lane] * t309 + work[11][lane] * t310 + (work[15][lane] * t311 + work[17][lane] * t312)));
+        jacobian[25][lane] = t255 + (work[27][lane] * t306 + work[114][lane] * t307 + (work[28][lane] * t309 + work[13][lane] * t310 + (work[116][lane] * t311 + work[115][lane] * t312)));
+        jacobian[26][lane] = work[86][lane] + (t253 + t251) + (work[121][lane] * t306 + work[113][lane] * t307 + (work[115][lane] * t309 + work[17][lane] * t310 + (work[34][lane] * t312 + work[35][lane] * t311)));
+        jacobian[27][lane] = work[85][lane] + (t253 + t254) + (work[120][lane] * t306 + work[112][lane] * t307 + (work[35][lane] * t312 + work[39][lane] * t311 + (work[116][lane] * t309 + work[15][lane] * t310)));
+        jacobian[28][lane] = 1.0 + (t248 + (work[43][lane] * t306 + work[123][lane] * t307 + (work[121][lane] * t312 + work[120][lane] * t311 + (work[27][lane] * t309 + work[9][lane] * t310))));
+        jacobian[29][lane] = t256 - t210 - work[26][lane] + (work[123][lane] * t306 + work[46][lane] * t307 + (work[114][lane] * t309 + work[7][lane] * t310 + (work[112][lane] * t311 + work[113][lane] * t312)));
+        jacobian[31][lane] = t256 - t188 - work[42][lane] + (work[114][lane] * t314 + work[27][lane] * t316 + (work[116][lane] * t321 + work[115][lane] * t323 + (work[13][lane] * t318 + work[28][lane] * t319)));
+        jacobian[32][lane] = work[38][lane] + t292 + (work[113][lane] * t314 + work[121][lane] * t316 + (work[17][lane] * t318 + work[115][lane] * t319 + (work[35][lane] * t321 + work[34][lane] * t323)));
+        jacobian[33][lane] = t258 - work[33][lane] + (work[112][lane] * t314 + work[120][lane] * t316 + (work[15][lane] * t318 + work[116][lane] * t319 + (work[35][lane] * t323 + work[39][lane] * t321)));
+        jacobian[34][lane] = work[26][lane] + (t188 + t256) + (work[123][lane] * t314 + work[43][lane] * t316 + (work[121][lane] * t323 + work[120][lane] * t321 + (work[9][lane] * t318 + work[27][lane] * t319)));
+        jacobian[35][lane] = 1.0 + (work[6][lane] + (work[46][lane] * t314 + work[123][lane] * t316 + (work[7][lane] * t318 + work[114][lane] * t319 + (work[113][lane] * t323 + work[112][lane] * t321))));
+        jacobian[30][lane] = t324;
+        increment_jacobian[0][lane] = work[129][lane] + (work[127][lane] - work[124][lane] - work[117][lane]);
+        increment_jacobian[1][lane] = work[108][lane] + (t329 + (x13 * work[116][lane] - x24 * work[115][lane] - x23 * work[28][lane]));
+        increment_jacobian[34][lane] = x23 * work[43][lane] + (x13 * work[121][lane] - x24 * work[120][lane] - t329) - work[108][lane];
+        increment_jacobian[2][lane] = work[109][lane] + (x14 * work[121][lane] + (t330 - x24 * work[34][lane] - x23 * work[115][lane]));
+        increment_jacobian[33][lane] = work[109][lane] + (x23 * work[120][lane] + (t330 - x24 * work[39][lane] - x14 * work[116][lane]));
+        increment_jacobian[3][lane] = x14 * work[120][lane] + (x13 * work[39][lane] - t331 - x23 * work[116][lane]) - work[110][lane];
+        increment_jacobian[32][lane] = x23 * work[121][lane] + (x13 * work[34][lane] - t331 - x14 * work[115][lane]) - work[110][lane];
+        increment_jacobian[4][lane] = x14 * work[43][lane] + (x13 * work[120][lane] - x24 * work[121][lane] - t332) - work[111][lane];
+        increment_jacobian[31][lane] = work[111][lane] + (t332 + (x13 * work[115][lane] - x24 * work[116][lane] - x14 * work[28][lane]));
+        increment_jacobian[5][lane] = work[122][lane] + (work[125][lane] - work[126][lane] - work[128][lane]);
+    }
+}
+
+/* so4_manakov_linearise_lanes_part3 (part 3 of 3) */
+so4_manakov_APART static void so4_manakov_linearise_lanes_part3(so4_manakov_lanes coef[restrict 32],
+                                                                so4_manakov_lanes y[restrict 6],
+                                                                so4_manakov_lanes displacement[restrict 6],
+                                                                so4_manakov_lanes increment[restrict 6],
+                                                                so4_manakov_lanes jacobian[restrict 36],
+                                                                so4_manakov_lanes increment_jacobian[restrict 36],
+                                                                so4_manakov_lanes work[restrict 130])
+{
+    (void)coef;
+    (void)displacement;
+    (void)increment;
+    (void)jacobian;
+    so4_manakov_EACH_LANE
+    for (int lane = 0; lane < so4_manakov_LANES; ++lane) {
+        const double x12 = y[0][lane];
+        const double x13 = y[1][lane];
+        const double x14 = y[2][lane];
+        const double x23 = y[3][lane];
+        const double x24 = y[4][lane];
+        const double x34 = y[5][lane];
+        const double t337 = x14 * work[7][lane];
+        const double t338 = x14 * work[114][lane];
+        const double t339 = x34 * work[115][lane];
+        const double t340 = x12 * work[116][lane];
+        const double t341 = x12 * work[35][lane];
+        const double t342 = x34 * work[35][lane];
+        const double t343 = x23 * work[9][lane];
+        const double t344 = x12 * work[120][lane];
+        const double t345 = x34 * work[121][lane];
+        const double t346 = x23 * work[7][lane];
+        const double t347 = x13 * work[7][lane];
+        const double t348 = x12 * work[27][lane];
+        const double t349 = x12 * work[121][lane];
+        const double t350 = x13 * work[113][lane];
+        const double t351 = x34 * work[116][lane];
+        const double t352 = x24 * work[15][lane];
+        const double t353 = x34 * work[27][lane];
+        const double t354 = x24 * work[7][lane];
+        const double t355 = x12 * work[115][lane];
+        const double t356 = x13 * work[17][lane];
+        const double t357 = x24 * work[112][lane];
+        const double t358 = x34 * work[120][lane];
+        const double t359 = x14 * work[13][lane];
+        const double t360 = x23 * work[123][lane];
+        increment_jacobian[6][lane] = t337 + (x23 * work[11][lane] - (x12 * work[15][lane] + x34 * work[17][lane])) - work[108][lane];
+        increment_jacobian[29][lane] = x34 * work[112][lane] + x12 * work[113][lane] - t337 - x23 * work[46][lane] + work[108][lane];
+        increment_jacobian[7][lane] = t338 + (work[117][lane] - (t339 + t340));
+        increment_jacobian[8][lane] = work[118][lane] + (x14 * work[113][lane] + (x23 * work[17][lane] - (t341 + x34 * work[34][lane])));
+        increment_jacobian[27][lane] = t341 + x34 * work[39][lane] - x14 * work[15][lane] - x23 * work[112][lane] - work[118][lane];
+        increment_jacobian[9][lane] = work[119][lane] + (x14 * work[112][lane] + (x23 * work[15][lane] - (t342 + x12 * work[39][lane])));
+        increment_jacobian[26][lane] = t342 + x12 * work[34][lane] - x14 * work[17][lane] - x23 * work[113][lane] - work[119][lane];
+        increment_jacobian[10][lane] = work[122][lane] + (t343 - (t344 + t345));
+        increment_jacobian[11][lane] = t346 - (x34 * work[113][lane] + x12 * work[112][lane]) + x14 * work[46][lane] - work[111][lane];
+        increment_jacobian[24][lane] = work[111][lane] + (x34 * work[15][lane] + x12 * work[17][lane] - x14 * work[11][lane] - t346);
+        increment_jacobian[12][lane] = x34 * work[13][lane] + x24 * work[11][lane] - (t347 + x12 * work[9][lane]) - work[109][lane];
+        increment_jacobian[23][lane] = x12 * work[114][lane] - t347 + (x24 * work[46][lane] - x34 * work[123][lane]) - work[109][lane];
+        increment_jacobian[13][lane] = x24 * work[13][lane] + x34 * work[28][lane] - (x13 * work[114][lane] + t348) - work[118][lane];
+        increment_jacobian[22][lane] = work[118][lane] + (t348 - x13 * work[9][lane] + (x24 * work[123][lane] - x34 * work[43][lane]));
+        increment_jacobian[14][lane] = t339 + work[124][lane] - (t349 + t350);
+        increment_jacobian[15][lane] = t351 + t352 - (t344 + work[125][lane]);
+        increment_jacobian[16][lane] = work[119][lane] + (t353 + x24 * work[9][lane] - (x13 * work[123][lane] + x12 * work[43][lane]));
+        increment_jacobian[19][lane] = x24 * work[114][lane] - t353 + (x12 * work[28][lane] - x13 * work[13][lane]) - work[119][lane];
+        increment_jacobian[17][lane] = work[110][lane] + (x34 * work[114][lane] + t354 - (x12 * work[123][lane] + x13 * work[46][lane]));
+        increment_jacobian[18][lane] = work[110][lane] + (t354 - x34 * work[9][lane] + (x12 * work[13][lane] - x13 * work[11][lane]));
+        increment_jacobian[20][lane] = t355 - t356 + (work[126][lane] - t345);
+        increment_jacobian[21][lane] = t357 - t358 + (t340 - work[127][lane]);
+        increment_jacobian[25][lane] = t351 + t355 - t359 - work[128][lane];
+        increment_jacobian[30][lane] = t343 + (t356 - t352 - t359);
+        increment_jacobian[28][lane] = t358 + t349 - work[129][lane] - t360;
+        increment_jacobian[35][lane] = t360 + (t350 - t357 - t338);
+    }
+}
+
+/* so4_manakov_linearise in all lanes. */
+static void so4_manakov_linearise_lanes(so4_manakov_lanes coef[restrict 32], so4_manakov_lanes y[restrict 6],
+                                        so4_manakov_lanes displacement[restrict 6],
+                                        so4_manakov_lanes increment[restrict 6],
+                                        so4_manakov_lanes jacobian[restrict 36],
+                                        so4_manakov_lanes increment_jacobian[restrict 36])
+{
+    so4_manakov_lanes work[130];
+    so4_manakov_linearise_lanes_part1(coef, y, displacement, increment, jacobian, increment_jacobian, work);
+    so4_manakov_linearise_lanes_part2(coef, y, displacement, increment, jacobian, increment_jacobian, work);
+    so4_manakov_linearise_lanes_part3(coef, y, displacement, increment, jacobian, increment_jacobian, work);
+}
+
+/* Invert the matrices of all lanes in place by elimination without pivoting: they are I + O(h). Infinite where a pivot is
+   far from 1. */
+static void so4_manakov_invert(so4_manakov_lanes matrix[restrict 36])
+{
+    for (int k = 0; k < 6; ++k) {
+        so4_manakov_lanes factor[6];
+        so4_manakov_EACH_LANE
+        for (int lane = 0; lane < so4_manakov_LANES; ++lane) {
+            const double reciprocal = 1.0 / matrix[k * 6 + k][lane];
+            matrix[k * 6 + k][lane] = 1.0;
+            for (int j = 0; j < 6; ++j) matrix[k * 6 + j][lane] *= reciprocal;
+            matrix[k * 6 + k][lane] += fabs(reciprocal) < 1e3 ? 0.0 : HUGE_VAL;
+        }
+        for (int i = 0; i < 6; ++i) {
+            so4_manakov_EACH_LANE
+            for (int lane = 0; lane < so4_manakov_LANES; ++lane) {
+                factor[i][lane] = matrix[i * 6 + k][lane];
+                if (i != k) matrix[i * 6 + k][lane] = 0.0;
+            }
+        }
+        for (int i = 0; i < 6; ++i)
+            for (int j = 0; j < 6 && i != k; ++j) {
+                so4_manakov_EACH_LANE
+                for (int lane = 0; lane < so4_manakov_LANES; ++lane)
+                    matrix[i * 6 + j][lane] -= factor[i][lane] * matrix[k * 6 + j][lane];
+            }
+    }
+}
+
+/* Everything about a stage at the points y. */
+static void so4_manakov_tabulate(so4_manakov_lanes coef[restrict], so4_manakov_lines *line)
+{
+    so4_manakov_linearise_lanes(coef, line->y, line->displacement, line->increment, line->inverse, line->slope);
+    so4_manakov_invert(line->inverse);
+    for (int i = 0; i < 6; ++i)
+        for (int j = 0; j < 6; ++j) {
+            so4_manakov_lanes sum = { 0.0 };
+            for (int k = 0; k < 6; ++k) {
+                so4_manakov_EACH_LANE
+                for (int lane = 0; lane < so4_manakov_LANES; ++lane)
+                    sum[lane] += line->slope[i * 6 + k][lane] * line->inverse[k * 6 + j][lane];
+            }
+            memcpy(line->gain[i * 6 + j], sum, sizeof sum);
+        }
+}
+
+/* so4_manakov_size in all lanes, summed over the components. */
+static void so4_manakov_sizes(so4_manakov_lanes y[restrict 6], so4_manakov_lanes delta[restrict 6],
+    so4_manakov_lanes size)
+{
+    so4_manakov_lanes norm = { 0.0 };
+    memset(size, 0, so4_manakov_LANES * sizeof size[0]);
+    for (int i = 0; i < 6; ++i)
+        for (int lane = 0; lane < so4_manakov_LANES; ++lane)
+            norm[lane] = 1e-6 * fabs(y[i][lane]) > norm[lane] ? 1e-6 * fabs(y[i][lane]) : norm[lane];
+    for (int i = 0; i < 6; ++i) {
+        so4_manakov_EACH_LANE
+        for (int lane = 0; lane < so4_manakov_LANES; ++lane)
+            size[lane] += fabs(delta[i][lane]) / (fabs(y[i][lane]) + norm[lane] + DBL_MIN);
+    }
+}
+
+/* The steps of a block one after the other, each along the lines of its lane. As X, the state with its carry, gains
+   increment - gain residual, the next residual follows from this one; X itself is added up apart. */
+static void so4_manakov_chain(so4_manakov_lines line[1], double x[6], double carry[6])
+{
+    double residual[6], sum[6], small[6];
+    for (int i = 0; i < 6; ++i) {
+        residual[i] = ((line->y[i][0] - x[i]) + line->displacement[i][0]) - carry[i];
+        sum[i] = x[i];
+        small[i] = carry[i];
+    }
+    for (int k = 0; k < 1 * so4_manakov_LANES; ++k) {
+        const int lane = k / 1, after = (k + 1) / 1 % so4_manakov_LANES;
+        so4_manakov_lines *at = &line[k % 1], *next = &line[(k + 1) % 1];
+        double correction[6] = { 0.0 };
+        for (int i = 0; i < 6; ++i) {
+            at->residual[i][lane] = residual[i];
+            for (int j = 0; j < 6; ++j) correction[i] -= at->gain[i * 6 + j][lane] * residual[j];
+        }
+        for (int i = 0; i < 6; ++i) {
+            const double change = at->increment[i][lane], total = sum[i] + change, added = total - sum[i];
+            const double turn = (next->displacement[i][after] - at->displacement[i][lane]) - change;
+            residual[i] = ((next->y[i][after] - at->y[i][lane]) + turn) + (residual[i] - correction[i]);
+            small[i] += ((sum[i] - (total - added)) + (change - added)) + correction[i];
+            sum[i] = total;
+        }
+    }
+    for (int i = 0; i < 6; ++i) {
+        x[i] = sum[i] + small[i];
+        carry[i] = small[i] - (x[i] - sum[i]);
+    }
+}
+
+/* Bring the table up to date. */
+static void so4_manakov_tell(const so4_manakov_solver *s, so4_manakov_table *table)
+{
+    for (int stage = 0; stage < 1; ++stage) {
+        if (table->fits[stage] == s->memory[stage].fits) continue;
+        table->fits[stage] = s->memory[stage].fits;
+        for (int k = 0; k < 32; ++k)
+            for (int lane = 0; lane < so4_manakov_LANES; ++lane) table->coef[stage][k][lane] = s->coef[stage][k];
+        memcpy(table->weight[stage], s->memory[stage].weight, sizeof table->weight[stage]);
+    }
+}
+
+/* The guesses for the next so4_manakov_LANES values. */
+static void so4_manakov_foresee(const so4_manakov_memory *memory, so4_manakov_lanes weight[restrict][6],
+    so4_manakov_lanes y[restrict 6])
+{
+    const int last = memory->count - 1;
+    for (int i = 0; i < 6; ++i) {
+        so4_manakov_EACH_LANE
+        for (int lane = 0; lane < so4_manakov_LANES; ++lane) {
+            double even = 0.0, odd = 0.0;
+            for (int k = 0; k < 32; k += 2) {
+                even += weight[k][i][lane] * memory->past[last - k][i];
+                odd += weight[k + 1][i][lane] * memory->past[last - 1 - k][i];
+            }
+            y[i][lane] = even + odd;
+        }
+    }
+}
+
+/* Correct y by the residuals that the chain found. The largest size of a correction; infinite if one is not finite. */
+static double so4_manakov_correct(so4_manakov_lines *line)
+{
+    so4_manakov_lanes size, delta[6];
+    double largest = 0.0, total = 0.0;
+    memset(delta, 0, sizeof delta);
+    for (int i = 0; i < 6; ++i)
+        for (int j = 0; j < 6; ++j) {
+            so4_manakov_EACH_LANE
+            for (int lane = 0; lane < so4_manakov_LANES; ++lane)
+                delta[i][lane] += line->inverse[i * 6 + j][lane] * line->residual[j][lane];
+        }
+    so4_manakov_sizes(line->y, delta, size);
+    for (int i = 0; i < 6; ++i)
+        for (int lane = 0; lane < so4_manakov_LANES; ++lane) line->y[i][lane] -= delta[i][lane];
+    for (int lane = 0; lane < so4_manakov_LANES; ++lane) {
+        total += size[lane];
+        largest = size[lane] > largest ? size[lane] : largest;
+    }
+    return isfinite(total) ? largest : HUGE_VAL;
+}
+
+/* so4_manakov_LANES steps at once: guess the points of all, and correct them together until the error that remains is as
+   small as after a single step. 0, and the solver as before, where that does not come about. */
+static int so4_manakov_block(so4_manakov_solver *s, so4_manakov_table *table)
+{
+    so4_manakov_lines line[1];
+    double x[6], carry[6], value[6], previous = HUGE_VAL;
+    int passes = 0, solved = 0;
+    for (int stage = 0; stage < 1; ++stage)
+        so4_manakov_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
+    while (!solved) {
+        double size = 0.0;
+        for (int stage = 0; stage < 1; ++stage) so4_manakov_tabulate(table->coef[stage], &line[stage]);
+        memcpy(x, s->x, sizeof x);
+        memcpy(carry, s->carry, sizeof carry);
+        so4_manakov_chain(line, x, carry);
+        for (int stage = 0; stage < 1; ++stage) size = fmax(size, so4_manakov_correct(&line[stage]));
+        s->evaluations += 1 * so4_manakov_LANES;
+        const double growth = size / (previous * previous);
+        /* The second test: after the square of so small a correction there is rounding only. */
+        solved = size * size * (growth > 1.0 ? growth : 1.0) <= 1e-20 || (previous < 1e-8 && size < 1e-10);
+        if (++passes == 4 || !(size < previous)) break;
+        previous = size;
+    }
+    for (int i = 0; i < 6; ++i)
+        if (!isfinite(x[i])) return 0;
+    if (!solved) return 0;
+    memcpy(s->x, x, sizeof x);
+    memcpy(s->carry, carry, sizeof carry);
+    s->steps += so4_manakov_LANES;
+    for (int stage = 0; stage < 1; ++stage) {
+        so4_manakov_memory *memory = &s->memory[stage];
+        for (int lane = 0; lane < so4_manakov_LANES; ++lane) {
+            for (int i = 0; i < 6; ++i) value[i] = line[stage].y[i][lane];
+            so4_manakov_record(memory, value);
+        }
+        memory->slow = passes > 1 ? memory->slow + so4_manakov_LANES : 0;
+        if (memory->slow > memory->patience) so4_manakov_fit(memory);
+    }
+    return 1;
+}
+
+/* Whether a block may be tried: not before there are recurrences to guess with, and not for a while after one that
+   failed. They take a thousand steps to repay. */
+static int so4_manakov_may_block(so4_manakov_solver *s, double h, size_t steps)
+{
+    int fit = s->setback > 0 && s->steps - s->fitted >= 1000;
+    if (!s->ready || memcmp(&h, &s->h, sizeof h) != 0 || steps < so4_manakov_LANES) return 0;
+    if (s->pause > 0) {
+        --s->pause;
+        return 0;
+    }
+    for (int stage = 0; stage < 1; ++stage) {
+        fit = fit || s->memory[stage].fits == 0;
+        if (s->memory[stage].count < 96) return 0;
+    }
+    if (fit && steps < 1000) return 0;
+    for (int stage = 0; stage < 1 && fit; ++stage) so4_manakov_fit(&s->memory[stage]);
+    if (fit) s->fitted = s->steps;
+    return 1;
+}
+
+/* Blocks of steps where the motion can be foreseen, single steps elsewhere: the results differ by round-off only. */
 so4_manakov_status so4_manakov_integrate(so4_manakov_solver *s, double h, size_t steps)
 {
-    for (size_t k = 0; k < steps; ++k) {
+    so4_manakov_table table;
+    for (int stage = 0; stage < 1; ++stage) table.fits[stage] = -1;
+    while (steps > 0) {
+        if (s != NULL && so4_manakov_may_block(s, h, steps)) {
+            so4_manakov_tell(s, &table);
+            if (so4_manakov_block(s, &table)) {
+                steps -= so4_manakov_LANES;
+                s->setback /= 2;
+                continue;
+            }
+            s->setback = 2 * s->setback + so4_manakov_LANES > 1000 ? 1000 : 2 * s->setback + so4_manakov_LANES;
+            s->pause = s->setback;
+        }
         const so4_manakov_status status = so4_manakov_step(s, h);
         if (status != so4_manakov_OK) return status;
+        --steps;
     }
     return so4_manakov_OK;
 }

@@ -14,13 +14,12 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 3255824e1b34f2d1ade62a9d4771471fb959f2078b45fe3d1f2fd3430a203f04
+ * body-sha256: 4a60bc5e8ed35302912515c433bb4976fff93b5d286f262d4d3ba5d41abc84e0
  */
 #ifndef SO4_MANAKOV_H
 #define SO4_MANAKOV_H
 
 #include <stddef.h>
-
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -47,19 +46,17 @@ typedef enum {
     so4_manakov_BAD_ARGUMENT    /* a null pointer, or a value that is not finite */
 } so4_manakov_status;
 
-/* Recent values of the unknown of the inner solve, for its starting guess. Two predictors compete: extrapolation by
-   backward differences, and a linear recurrence fitted to the last 80 values; they affect speed only. */
+/* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
+   fitted to the last 96 values. They affect speed only. */
 typedef struct {
-    int rows;  /* rows of lag in use */
-    int guess; /* how many of them the extrapolation adds up */
-    int count; /* values in past */
-    int slow;  /* how many of the last steps took more than one iteration */
-    int trained; /* whether weight is set */
-    double lag[8][so4_manakov_DIM]; /* backward differences, order by order */
-    double past[160][so4_manakov_DIM];   /* values, the latest last */
-    double weight[16][so4_manakov_DIM]; /* of past values, the latest first */
-    double predicted[2][so4_manakov_DIM]; /* what the two predictors say of the next value */
-    double error[2];                     /* their recent errors */
+    int count;    /* values in past */
+    int order;    /* how many of them the extrapolation uses */
+    int fits;     /* how often weight has been fitted */
+    int fitting;  /* whether the recurrence is the better guess */
+    int slow;     /* how many of the last steps took more than one iteration */
+    int patience; /* how many of those before the recurrence is fitted again */
+    double past[192][so4_manakov_DIM]; /* values, the latest last */
+    double weight[32][so4_manakov_DIM][8]; /* of past values, the latest first, for the next values */
 } so4_manakov_memory;
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with so4_manakov_init. */
@@ -72,6 +69,9 @@ typedef struct {
     double gauge[1]; /* multiples of A taken from H */
     double h;  /* the step size that coef belongs to */
     int ready; /* whether coef has been computed */
+    int pause;   /* steps to make singly before a block is tried */
+    int setback; /* the last pause, halved with every block that succeeds */
+    size_t fitted; /* steps when recurrences were last fitted for blocks */
     double coef[1][32]; /* what depends on params and h only, for each stage */
     so4_manakov_memory memory[1];
 } so4_manakov_solver;

@@ -14,12 +14,13 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 870a87ff0902b16702dbcd58737f9a193d505a8ba8ede87b0c7e6a0af90fc6be
+ * body-sha256: 5428580b6ebdd436d3790f1a45a0a769c59a82fd3ae6dfe1539e65f6dd34abd0
  */
 #include "spin_chain5.h"
 
 #include <float.h>
 #include <math.h>
+#include <stdint.h>
 #include <string.h>
 
 const spin_chain5_params spin_chain5_default_params = { 1.0 };
@@ -1708,119 +1709,128 @@ static int spin_chain5_solve(double matrix[225], double side[15])
     return 1;
 }
 
-/* Keep the backward differences of a vector that varies slowly from step to step (y - x), and choose how
-   many of them to extrapolate with next time: the first difference left out estimates the error of the guess. */
-static void spin_chain5_difference(spin_chain5_memory *memory, const double value[15])
+/* The guess for the next value (y), from earlier ones; 0 if there are none. */
+static int spin_chain5_predict(const spin_chain5_memory *memory, double value[15])
 {
-    double row[15], least = HUGE_VAL;
-    const int rows = memory->rows < 8 ? memory->rows + 1 : 8;
-    memcpy(row, value, sizeof row);
-    for (int k = 0; k < rows; ++k) {
-        double size = 0.0;
-        for (int i = 0; i < 15; ++i) {
-            const double before = k < memory->rows ? memory->lag[k][i] : 0.0;
-            memory->lag[k][i] = row[i];
-            size += fabs(row[i]);
-            row[i] -= before;
+    const int last = memory->count - 1;
+    double odd[15] = { 0.0 }, binomial = -1.0;
+    memset(value, 0, 15 * sizeof value[0]);
+    if (memory->fitting) {
+        for (int k = 0; k < 32; k += 2)
+            for (int i = 0; i < 15; ++i) {
+                value[i] += memory->weight[k][i][0] * memory->past[last - k][i];
+                odd[i] += memory->weight[k + 1][i][0] * memory->past[last - 1 - k][i];
+            }
+        for (int i = 0; i < 15; ++i) value[i] += odd[i];
+    } else {
+        for (int k = 0; k < memory->order && k <= last; ++k) {
+            binomial *= -(double)(memory->order - k) / (k + 1);
+            for (int i = 0; i < 15; ++i) value[i] += binomial * memory->past[last - k][i];
         }
+    }
+    return last >= 0;
+}
+
+/* Choose the guess that would have been best for a value that took several iterations. */
+static void spin_chain5_judge(spin_chain5_memory *memory, const double value[15])
+{
+    double row[8 + 1][15], guess[15], least = HUGE_VAL, fitted = HUGE_VAL;
+    const int rows = memory->count < 8 ? memory->count : 8;
+    memcpy(row[0], value, sizeof row[0]);
+    for (int k = 0; k < rows; ++k) memcpy(row[k + 1], memory->past[memory->count - 1 - k], sizeof row[0]);
+    for (int order = 1; order <= rows; ++order) { /* row[0] becomes the backward difference of this order */
+        double size = 0.0;
+        for (int k = 0; k <= rows - order; ++k)
+            for (int i = 0; i < 15; ++i) row[k][i] -= row[k + 1][i];
+        for (int i = 0; i < 15; ++i) size += fabs(row[0][i]);
         if (size < least) {
             least = size;
-            memory->guess = k;
+            memory->order = order;
         }
     }
-    memory->rows = rows;
-}
-
-/* The guess of the better predictor; zero without a history. Both are kept, to be judged by the solved value. */
-static void spin_chain5_predict(spin_chain5_memory *memory, double value[15])
-{
-    double(*guess)[15] = memory->predicted;
-    memset(memory->predicted, 0, sizeof memory->predicted);
-    for (int k = 0; k < memory->guess; ++k)
-        for (int i = 0; i < 15; ++i) guess[0][i] += memory->lag[k][i];
-    if (memory->trained) {
-        const int last = memory->count - 1;
-        double odd[15] = { 0.0 };
-        for (int k = 0; k < 16; k += 2)
-            for (int i = 0; i < 15; ++i) {
-                guess[1][i] += memory->weight[k][i] * memory->past[last - k][i];
-                odd[i] += memory->weight[k + 1][i] * memory->past[last - 1 - k][i];
-            }
-        for (int i = 0; i < 15; ++i) guess[1][i] += odd[i];
+    memory->fitting = memory->fits > 0;
+    if (memory->fitting && spin_chain5_predict(memory, guess)) {
+        fitted = 0.0;
+        for (int i = 0; i < 15; ++i) fitted += fabs(value[i] - guess[i]);
     }
-    memcpy(value, guess[memory->trained && memory->error[1] <= memory->error[0]], 15 * sizeof value[0]);
+    memory->fitting = memory->fits > 0 && fitted <= least;
+    if (memory->order == 0) memory->order = 1;
 }
 
-/* Fit the recurrence value[m] = sum of weight[k] * value[m - 1 - k] to the history, component by component: ridge
-   least squares by modified Gram-Schmidt, the ridge at the level of rounding. */
+/* Fit the recurrences value[m + l] = sum of weight[k][..][l] * value[m - 1 - k], l = 0 ... 8 - 1, to the history,
+   component by component: ridge least squares by modified Gram-Schmidt, the ridge at the level of rounding. The last
+   8 columns of q are the right-hand sides. */
 static void spin_chain5_train(spin_chain5_memory *memory, int component)
 {
-    enum { ROWS = 80 - 16, ALL = 80 };
-    double q[16][ALL], r[16][16], b[ALL] = { 0.0 }, largest = 0.0;
-    const int first = memory->count - 80;
+    enum { WINDOW = 32, AHEAD = 8, ROWS = 96 - WINDOW - AHEAD + 1 };
+    double q[ROWS + WINDOW][WINDOW + AHEAD], r[WINDOW][WINDOW + AHEAD], largest = 0.0;
     memset(q, 0, sizeof q);
-    for (int i = 0; i < 80; ++i)
-        if (fabs(memory->past[first + i][component]) > largest) largest = fabs(memory->past[first + i][component]);
-    for (int k = 0; k < 16; ++k) {
-        for (int i = 0; i < ROWS; ++i) q[k][i] = memory->past[first + i + 16 - 1 - k][component];
-        q[k][ROWS + k] = 1e-13 * largest;
-    }
-    for (int i = 0; i < ROWS; ++i) b[i] = memory->past[first + i + 16][component];
-    for (int k = 0; k < 16; ++k) {
-        double norm = 0.0, along = 0.0;
-        for (int i = 0; i < ALL; ++i) norm += q[k][i] * q[k][i];
-        r[k][k] = sqrt(norm);
-        for (int i = 0; i < ALL; ++i) q[k][i] = norm > 0.0 ? q[k][i] / r[k][k] : 0.0;
-        for (int j = k + 1; j < 16; ++j) {
-            double dot = 0.0;
-            for (int i = 0; i < ALL; ++i) dot += q[k][i] * q[j][i];
-            r[k][j] = dot;
-            for (int i = 0; i < ALL; ++i) q[j][i] -= dot * q[k][i];
+    memset(r, 0, sizeof r);
+    for (int i = 0; i < ROWS; ++i) {
+        for (int j = 0; j < WINDOW + AHEAD; ++j) {
+            const int place = j < WINDOW ? WINDOW - 1 - j : j;
+            q[i][j] = memory->past[memory->count - 96 + i + place][component];
         }
-        for (int i = 0; i < ALL; ++i) along += q[k][i] * b[i];
-        memory->weight[k][component] = along;
-        for (int i = 0; i < ALL; ++i) b[i] -= along * q[k][i];
+        if (fabs(q[i][0]) > largest) largest = fabs(q[i][0]);
     }
-    for (int k = 16 - 1; k >= 0; --k) {
-        double sum = memory->weight[k][component];
-        for (int j = k + 1; j < 16; ++j) sum -= r[k][j] * memory->weight[j][component];
-        memory->weight[k][component] = r[k][k] > 0.0 ? sum / r[k][k] : 0.0;
+    for (int k = 0; k < WINDOW; ++k) q[ROWS + k][k] = 1e-13 * largest;
+    for (int k = 0; k < WINDOW; ++k) {
+        for (int i = 0; i < ROWS + WINDOW; ++i)
+            for (int j = k; j < WINDOW + AHEAD; ++j) r[k][j] += q[i][k] * q[i][j];
+        const double scale = r[k][k] > 0.0 ? 1.0 / r[k][k] : 0.0;
+        for (int j = k + 1; j < WINDOW + AHEAD; ++j) r[k][j] *= scale;
+        for (int i = 0; i < ROWS + WINDOW; ++i)
+            for (int j = k + 1; j < WINDOW + AHEAD; ++j) q[i][j] -= q[i][k] * r[k][j];
     }
+    for (int l = 0; l < AHEAD; ++l)
+        for (int k = WINDOW - 1; k >= 0; --k) {
+            double sum = r[k][WINDOW + l];
+            for (int j = k + 1; j < WINDOW; ++j) sum -= r[k][j] * memory->weight[j][component][l];
+            memory->weight[k][component][l] = sum;
+        }
 }
 
-/* Take in the solved value: update both predictors and their errors, and fit the recurrence when steps have been
-   taking several iterations. */
-static void spin_chain5_remember(spin_chain5_memory *memory, const double value[15], int iterations)
+/* Add a value to the history. */
+static void spin_chain5_record(spin_chain5_memory *memory, const double value[15])
 {
-    for (int kind = 0; kind < 2; ++kind) {
-        double error = 0.0;
-        for (int i = 0; i < 15; ++i) error += fabs(value[i] - memory->predicted[kind][i]);
-        memory->error[kind] = fmax(0.8 * memory->error[kind], error);
-    }
-    spin_chain5_difference(memory, value);
-    if (memory->count == 160) {
-        memmove(memory->past, memory->past + 160 - 80, 80 * sizeof memory->past[0]);
-        memory->count = 80;
+    if (memory->count == 192) {
+        memmove(memory->past, memory->past + 192 - 96, 96 * sizeof memory->past[0]);
+        memory->count = 96;
     }
     memcpy(memory->past[memory->count++], value, 15 * sizeof value[0]);
-    memory->slow = iterations > 1 ? memory->slow + 1 : 0;
-    if (memory->slow >= 80 && memory->count >= 80) {
-        for (int i = 0; i < 15; ++i) spin_chain5_train(memory, i);
-        memory->trained = 1;
-        memory->error[1] = 0.0;
-        memory->slow = -80;
-    }
 }
 
-/* x + change in compensated arithmetic. 0, and x as before, if the sum is not finite. */
-static int spin_chain5_advance(spin_chain5_solver *s, const double change[15])
+/* Fit the recurrence to the last values; with every time, wait longer before it is done again. */
+static void spin_chain5_fit(spin_chain5_memory *memory)
+{
+    for (int i = 0; i < 15; ++i) spin_chain5_train(memory, i);
+    memory->fitting = 1;
+    ++memory->fits;
+    memory->slow = 0;
+    memory->patience = memory->patience < 10000 ? 2 * memory->patience + 96 : 20000;
+}
+
+/* Take in the solved value: what took one iteration needs no better guess. */
+static void spin_chain5_remember(spin_chain5_memory *memory, const double value[15], int iterations)
+{
+    if (iterations > 1) spin_chain5_judge(memory, value);
+    spin_chain5_record(memory, value);
+    memory->slow = iterations > 1 ? memory->slow + 1 : 0;
+    if (memory->slow > memory->patience && memory->count >= 96) spin_chain5_fit(memory);
+}
+
+/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last
+   bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the
+   sum is not finite. */
+static int spin_chain5_advance(spin_chain5_solver *s, const double change[15], const double correction[15])
 {
     double x[15], carry[15];
     for (int i = 0; i < 15; ++i) {
-        const double addend = change[i] + s->carry[i];
-        x[i] = s->x[i] + addend;
-        const double added = x[i] - s->x[i];
-        carry[i] = (s->x[i] - (x[i] - added)) + (addend - added);
+        const double sum = s->x[i] + change[i], added = sum - s->x[i];
+        const double lost = (s->x[i] - (sum - added)) + (change[i] - added);
+        const double small = lost + (s->carry[i] + correction[i]);
+        x[i] = sum + small;
+        carry[i] = small - (x[i] - sum);
         if (!isfinite(x[i])) return 0;
     }
     memcpy(s->x, x, sizeof x);
@@ -1844,20 +1854,19 @@ static double spin_chain5_size(const double y[15], const double delta[15])
 
 /* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the extrapolated guess, and advance. The
    increment is corrected to first order by the last Newton correction, so that correction costs no evaluation:
-   a correction is accepted when the error that remains after it, quadratic in it, is below 1e-18. */
+   a correction is accepted when the error that remains after it, quadratic in it, is below 1e-20. */
 static spin_chain5_status spin_chain5_attempt(spin_chain5_solver *s, int stage)
 {
     const double *coef = s->coef[stage];
     spin_chain5_memory *memory = &s->memory[stage];
     double y[15], delta[15], displacement[15], increment[15];
     double jacobian[225], increment_jacobian[225];
-    spin_chain5_predict(memory, y);
-    for (int i = 0; i < 15; ++i) y[i] += s->x[i];
+    if (!spin_chain5_predict(memory, y)) memcpy(y, s->x, sizeof y);
     double previous = HUGE_VAL;
     for (int iteration = 0; iteration < 20; ++iteration) {
         spin_chain5_linearise(coef, y, displacement, increment, jacobian, increment_jacobian);
         ++s->evaluations;
-        for (int i = 0; i < 15; ++i) delta[i] = ((y[i] - s->x[i]) - s->carry[i]) + displacement[i];
+        for (int i = 0; i < 15; ++i) delta[i] = ((y[i] - s->x[i]) + displacement[i]) - s->carry[i];
         const int regular = spin_chain5_solve(jacobian, delta);
         const double size = spin_chain5_size(y, delta);
         if (!isfinite(size)) return spin_chain5_NOT_FINITE;
@@ -1866,14 +1875,12 @@ static spin_chain5_status spin_chain5_attempt(spin_chain5_solver *s, int stage)
         const double growth = size / (previous * previous);
         const double remaining = size * size * (growth > 1.0 ? growth : 1.0);
         /* The second test: corrections no longer shrink, the solve has reached the level of rounding. */
-        if (remaining <= 1e-18 || (previous < 1e-8 && size > 0.25 * previous)) {
-            double offset[15];
-            for (int i = 0; i < 15; ++i) {
-                offset[i] = y[i] - s->x[i];
-                for (int j = 0; j < 15; ++j) increment[i] -= increment_jacobian[i * 15 + j] * delta[j];
-            }
-            if (!spin_chain5_advance(s, increment)) return spin_chain5_NOT_FINITE;
-            spin_chain5_remember(memory, offset, iteration + 1);
+        if (remaining <= 1e-20 || (previous < 1e-8 && size > 0.25 * previous)) {
+            double correction[15] = { 0.0 };
+            for (int i = 0; i < 15; ++i)
+                for (int j = 0; j < 15; ++j) correction[i] -= increment_jacobian[i * 15 + j] * delta[j];
+            if (!spin_chain5_advance(s, increment, correction)) return spin_chain5_NOT_FINITE;
+            spin_chain5_remember(memory, y, iteration + 1);
             return spin_chain5_OK;
         }
         previous = size;
@@ -1890,7 +1897,7 @@ static spin_chain5_status spin_chain5_stages(spin_chain5_solver *s)
     memcpy(carry, s->carry, sizeof carry);
     for (int stage = 0; stage < 1; ++stage) {
         spin_chain5_status status = spin_chain5_attempt(s, stage);
-        if (status != spin_chain5_OK && s->memory[stage].rows > 0) {
+        if (status != spin_chain5_OK && s->memory[stage].count > 0) {
             memset(&s->memory[stage], 0, sizeof s->memory[stage]);
             status = spin_chain5_attempt(s, stage);
         }
@@ -2491,11 +2498,1823 @@ spin_chain5_status spin_chain5_step(spin_chain5_solver *s, double h)
     return status;
 }
 
+/*
+ * Eight at a time: below, the formulas of a step are evaluated for 8 steps of a trajectory, or members of an
+ * ensemble, at once. Compilers make vector instructions of the loops over lanes.
+ */
+enum { spin_chain5_LANES = 8 };
+
+#if defined(__GNUC__)
+typedef double spin_chain5_lanes[spin_chain5_LANES] __attribute__((aligned(64))); /* a value in each lane */
+#else
+typedef double spin_chain5_lanes[spin_chain5_LANES];
+#endif
+
+#if defined(__clang__)
+#define spin_chain5_EACH_LANE _Pragma("clang loop vectorize(assume_safety)")
+#pragma clang diagnostic ignored "-Wpass-failed"
+#elif defined(__GNUC__)
+#define spin_chain5_EACH_LANE _Pragma("GCC ivdep") _Pragma("GCC unroll 1")
+#else
+#define spin_chain5_EACH_LANE
+#endif
+
+/* What all blocks share: coefficients, the same in each lane, and the recurrences by which they are foreseen. */
+typedef struct {
+    int fits[1]; /* the fit that weight is of; -1 for none */
+    spin_chain5_lanes coef[1][33], weight[1][32][15];
+} spin_chain5_table;
+
+/* A stage in all lanes, linear around y: a residual r of alpha(y) = x takes inverse r from y and gain r from the
+   increment. */
+typedef struct {
+    spin_chain5_lanes y[15], displacement[15], increment[15], residual[15];
+    spin_chain5_lanes inverse[225], slope[225], gain[225];
+} spin_chain5_lines;
+
+/* spin_chain5_phi0 for the loops over lanes: no branches. Infinite beyond |s| = 4.0. */
+static inline double spin_chain5_phi0_lane(double s)
+{
+    double sum = 1.455172475614865e-27;
+    sum = sum * s + 5.744790668872202e-26;
+    sum = sum * s + 2.267952452337683e-24;
+    sum = sum * s + 8.953517427037546e-23;
+    sum = sum * s + 3.534707039629467e-21;
+    sum = sum * s + 1.3954464685812522e-19;
+    sum = sum * s + 5.5090028283602295e-18;
+    sum = sum * s + 2.174868698558062e-16;
+    sum = sum * s + 8.586062056277845e-15;
+    sum = sum * s + 3.3896802963225827e-13;
+    sum = sum * s + 1.3382536530684679e-11;
+    sum = sum * s + 5.284190138687493e-10;
+    sum = sum * s + 2.08767569878681e-08;
+    sum = sum * s + 8.267195767195768e-07;
+    sum = sum * s + 3.306878306878307e-05;
+    sum = sum * s + 0.001388888888888889;
+    sum = sum * s + 0.08333333333333333;
+    return sum + (fabs(s) <= 4.0 ? 0.0 : HUGE_VAL);
+}
+
+/* spin_chain5_phi1 for the loops over lanes: no branches. Infinite beyond |s| = 4.0. */
+static inline double spin_chain5_phi1_lane(double s)
+{
+    double sum = 6.266191399131027e-28;
+    sum = sum * s + 2.328275960983784e-26;
+    sum = sum * s + 8.617186003308303e-25;
+    sum = sum * s + 3.1751334332727565e-23;
+    sum = sum * s + 1.163957265514881e-21;
+    sum = sum * s + 4.241648447555361e-20;
+    sum = sum * s + 1.5349911154393775e-18;
+    sum = sum * s + 5.5090028283602297e-17;
+    sum = sum * s + 1.9573818287022555e-15;
+    sum = sum * s + 6.868849645022276e-14;
+    sum = sum * s + 2.372776207425808e-12;
+    sum = sum * s + 8.029521918410807e-11;
+    sum = sum * s + 2.6420950693437467e-09;
+    sum = sum * s + 8.35070279514724e-08;
+    sum = sum * s + 2.48015873015873e-06;
+    sum = sum * s + 6.613756613756614e-05;
+    sum = sum * s + 0.001388888888888889;
+    return sum + (fabs(s) <= 4.0 ? 0.0 : HUGE_VAL);
+}
+
+/* spin_chain5_linearise_lanes_part1 (part 1 of 7) */
+spin_chain5_APART static void spin_chain5_linearise_lanes_part1(spin_chain5_lanes coef[restrict 33],
+                                                                spin_chain5_lanes y[restrict 15],
+                                                                spin_chain5_lanes displacement[restrict 15],
+                                                                spin_chain5_lanes increment[restrict 15],
+                                                                spin_chain5_lanes jacobian[restrict 225],
+                                                                spin_chain5_lanes increment_jacobian[restrict 225],
+                                                                spin_chain5_lanes work[restrict 517])
+{
+    (void)jacobian;
+    (void)increment_jacobian;
+    spin_chain5_EACH_LANE
+    for (int lane = 0; lane < spin_chain5_LANES; ++lane) {
+        const double x1 = y[0][lane];
+        const double y1_ = y[1][lane];
+        const double z1 = y[2][lane];
+        const double x2 = y[3][lane];
+        const double y2 = y[4][lane];
+        const double z2 = y[5][lane];
+        const double x3 = y[6][lane];
+        const double y3 = y[7][lane];
+        const double z3 = y[8][lane];
+        const double x4 = y[9][lane];
+        const double y4 = y[10][lane];
+        const double z4 = y[11][lane];
+        const double x5 = y[12][lane];
+        const double y5 = y[13][lane];
+        const double z5 = y[14][lane];
+        work[20][lane] = coef[3][lane] * x5;
+        work[50][lane] = coef[3][lane] * x4;
+        work[14][lane] = work[20][lane] + (coef[5][lane] * x2 + work[50][lane]);
+        const double t4 = coef[9][lane] * z2 + coef[8][lane] * z5;
+        const double t5 = x1 * t4;
+        const double t6 = coef[13][lane] * x2;
+        work[116][lane] = coef[12][lane] * x5 + t6;
+        work[37][lane] = x5 * z4;
+        work[36][lane] = x4 * z5;
+        const double t10 = coef[3][lane] * work[37][lane] + coef[4][lane] * work[36][lane];
+        const double t11 = coef[6][lane] * z2;
+        work[128][lane] = coef[4][lane] * z4;
+        work[126][lane] = t11 + work[128][lane];
+        const double t14 = t10 + x3 * work[126][lane];
+        work[117][lane] = z3 * work[14][lane] + (t5 + (z1 * work[116][lane] + t14));
+        work[27][lane] = coef[3][lane] * y5;
+        work[52][lane] = coef[3][lane] * y4;
+        work[9][lane] = work[27][lane] + (coef[5][lane] * y2 + work[52][lane]);
+        const double t19 = y1_ * t4;
+        const double t20 = coef[13][lane] * y2;
+        work[106][lane] = t20 + coef[12][lane] * y5;
+        work[38][lane] = y5 * z4;
+        work[39][lane] = y4 * z5;
+        const double t24 = coef[3][lane] * work[38][lane] + coef[4][lane] * work[39][lane];
+        const double t25 = y3 * work[126][lane] + t24;
+        work[121][lane] = z3 * work[9][lane] + (t19 + (z1 * work[106][lane] + t25));
+        const double t27 = coef[8][lane] * z2 + coef[7][lane] * z5;
+        work[65][lane] = x1 * t27;
+        work[61][lane] = coef[3][lane] * z4;
+        work[8][lane] = coef[4][lane] * z2;
+        work[127][lane] = work[61][lane] + work[8][lane];
+        work[66][lane] = x3 * work[127][lane];
+        work[35][lane] = coef[1][lane] * z5;
+        work[119][lane] = coef[4][lane] * z3;
+        work[137][lane] = work[35][lane] + work[119][lane];
+        work[67][lane] = x4 * work[137][lane];
+        work[62][lane] = coef[11][lane] * z1;
+        const double t38 = coef[2][lane] * z4 + work[62][lane];
+        work[147][lane] = x5 * t38;
+        work[148][lane] = work[65][lane] + (work[66][lane] + (work[67][lane] + work[147][lane]));
+        work[40][lane] = coef[0][lane] * z5;
+        work[13][lane] = coef[0][lane] * z2;
+        work[80][lane] = y1_ * t27;
+        work[81][lane] = y3 * work[127][lane];
+        work[160][lane] = y5 * t38;
+        work[82][lane] = y4 * work[137][lane];
+        work[161][lane] = work[80][lane] + (work[81][lane] + (work[160][lane] + work[82][lane]));
+        work[101][lane] = x2 * work[117][lane] + (y2 * work[121][lane] + (x5 * work[148][lane] + (work[40][lane] + (coef[10][lane] * z1 + work[13][lane]) + y5 * work[161][lane])));
+        work[113][lane] = work[101][lane] * work[101][lane];
+        work[115][lane] = coef[8][lane] * y5 + coef[9][lane] * y2;
+        const double t50 = x1 * work[115][lane];
+        work[43][lane] = x5 * y4;
+        work[44][lane] = x4 * y5;
+        const double t53 = coef[3][lane] * work[43][lane] + coef[4][lane] * work[44][lane];
+        work[129][lane] = coef[4][lane] * y4;
+        const double t55 = coef[6][lane] * y2;
+        work[131][lane] = work[129][lane] + t55;
+        const double t57 = t53 + x3 * work[131][lane];
+        work[120][lane] = y3 * work[14][lane] + (t50 + (y1_ * work[116][lane] + t57));
+        work[7][lane] = coef[3][lane] * z5;
+        work[23][lane] = work[7][lane] + (coef[5][lane] * z2 + work[61][lane]);
+        const double t61 = coef[13][lane] * z2;
+        work[107][lane] = coef[12][lane] * z5 + t61;
+        work[12][lane] = coef[4][lane] * work[38][lane] + coef[3][lane] * work[39][lane];
+        const double t64 = z1 * work[115][lane] + (work[12][lane] + z3 * work[131][lane]);
+        work[125][lane] = y3 * work[23][lane] + (y1_ * work[107][lane] + t64);
+        work[114][lane] = coef[7][lane] * y5 + coef[8][lane] * y2;
+        work[76][lane] = x1 * work[114][lane];
+        work[28][lane] = coef[4][lane] * y2;
+        work[130][lane] = work[52][lane] + work[28][lane];
+        work[77][lane] = x3 * work[130][lane];
+        work[118][lane] = coef[4][lane] * y3;
+        work[47][lane] = coef[1][lane] * y5;
+        work[142][lane] = work[118][lane] + work[47][lane];
+        work[79][lane] = x4 * work[142][lane];
+        work[53][lane] = coef[11][lane] * y1_;
+        const double t76 = work[53][lane] + coef[2][lane] * y4;
+        work[154][lane] = x5 * t76;
+        work[155][lane] = work[76][lane] + (work[77][lane] + (work[79][lane] + work[154][lane]));
+        work[48][lane] = coef[0][lane] * y5;
+        work[34][lane] = coef[0][lane] * y2;
+        work[58][lane] = z1 * work[114][lane];
+        work[59][lane] = z3 * work[130][lane];
+        work[60][lane] = z4 * work[142][lane];
+        work[167][lane] = z5 * t76;
+        work[168][lane] = work[58][lane] + (work[59][lane] + (work[60][lane] + work[167][lane]));
+        work[108][lane] = x2 * work[120][lane] + (z2 * work[125][lane] + (x5 * work[155][lane] + (work[48][lane] + (work[34][lane] + coef[10][lane] * y1_) + z5 * work[168][lane])));
+        work[112][lane] = work[108][lane] * work[108][lane];
+        work[99][lane] = coef[9][lane] * x2 + coef[8][lane] * x5;
+        work[134][lane] = coef[4][lane] * x4;
+        const double t89 = coef[6][lane] * x2;
+        work[132][lane] = work[134][lane] + t89;
+        work[31][lane] = coef[4][lane] * work[43][lane] + coef[3][lane] * work[44][lane];
+        const double t92 = y1_ * work[99][lane] + (y3 * work[132][lane] + work[31][lane]);
+        work[122][lane] = x3 * work[9][lane] + (x1 * work[106][lane] + t92);
+        work[17][lane] = coef[3][lane] * work[36][lane] + coef[4][lane] * work[37][lane];
+        const double t95 = z1 * work[99][lane] + (work[17][lane] + z3 * work[132][lane]);
+        work[124][lane] = x3 * work[23][lane] + (x1 * work[107][lane] + t95);
+        work[98][lane] = coef[8][lane] * x2 + coef[7][lane] * x5;
+        work[92][lane] = y1_ * work[98][lane];
+        work[19][lane] = coef[4][lane] * x2;
+        work[133][lane] = work[19][lane] + work[50][lane];
+        work[93][lane] = y3 * work[133][lane];
+        work[123][lane] = coef[4][lane] * x3;
+        work[42][lane] = coef[1][lane] * x5;
+        work[145][lane] = work[123][lane] + work[42][lane];
+        work[94][lane] = y4 * work[145][lane];
+        work[51][lane] = coef[11][lane] * x1;
+        const double t107 = work[51][lane] + coef[2][lane] * x4;
+        work[162][lane] = y5 * t107;
+        work[163][lane] = work[92][lane] + (work[93][lane] + (work[94][lane] + work[162][lane]));
+        work[45][lane] = coef[0][lane] * x5;
+        work[26][lane] = coef[0][lane] * x2;
+        work[55][lane] = z1 * work[98][lane];
+        work[56][lane] = z3 * work[133][lane];
+        work[165][lane] = z5 * t107;
+        work[57][lane] = z4 * work[145][lane];
+        work[166][lane] = work[55][lane] + (work[56][lane] + (work[165][lane] + work[57][lane]));
+        work[109][lane] = y2 * work[122][lane] + (z2 * work[124][lane] + (y5 * work[163][lane] + (work[45][lane] + (coef[10][lane] * x1 + work[26][lane]) + z5 * work[166][lane])));
+        work[185][lane] = work[109][lane] * work[109][lane];
+        work[221][lane] = work[112][lane] + work[185][lane];
+        work[100][lane] = work[113][lane] + work[221][lane];
+        work[104][lane] = spin_chain5_phi0_lane(work[100][lane]);
+        work[217][lane] = z1 * work[109][lane];
+        work[103][lane] = x1 * work[101][lane];
+        work[102][lane] = work[217][lane] - work[103][lane];
+        work[110][lane] = x1 * work[108][lane];
+        work[175][lane] = y1_ * work[109][lane];
+        work[111][lane] = work[110][lane] - work[175][lane];
+        work[105][lane] = work[101][lane] * work[102][lane] - work[108][lane] * work[111][lane];
+        work[171][lane] = y1_ * work[101][lane];
+        work[218][lane] = z1 * work[108][lane];
+        work[172][lane] = work[171][lane] - work[218][lane];
+        work[169][lane] = work[109][lane] * work[111][lane] - work[101][lane] * work[172][lane];
+        work[215][lane] = work[108][lane] * work[172][lane] - work[109][lane] * work[102][lane];
+        work[239][lane] = work[7][lane] + (work[61][lane] + coef[19][lane] * z2);
+        const double t134 = coef[20][lane] * z5 + t61;
+        work[143][lane] = coef[4][lane] * x5;
+        const double t136 = work[143][lane] + t89;
+        work[24][lane] = z1 * t136;
+        work[18][lane] = coef[18][lane] * z2;
+        const double t139 = coef[14][lane] * z4 + work[18][lane];
+        work[240][lane] = x3 * t139;
+        work[245][lane] = coef[16][lane] * x2 + coef[15][lane] * x4;
+        work[25][lane] = z3 * work[245][lane] + t10;
+        work[241][lane] = work[24][lane] + (work[240][lane] + work[25][lane]);
+        work[41][lane] = coef[0][lane] * z3;
+        work[54][lane] = coef[0][lane] * z1;
+        work[141][lane] = coef[4][lane] * y5;
+        const double t147 = work[141][lane] + t55;
+        work[32][lane] = z1 * t147;
+        work[246][lane] = y3 * t139;
+        work[234][lane] = coef[15][lane] * y4 + coef[16][lane] * y2;
+        work[33][lane] = z3 * work[234][lane] + t24;
+        work[247][lane] = work[32][lane] + (work[246][lane] + work[33][lane]);
+        work[2][lane] = x1 * (x3 * work[239][lane] + (x1 * t134 + t95)) + (y1_ * (y3 * work[239][lane] + (y1_ * t134 + t64)) + (x3 * work[241][lane] + (work[41][lane] + (coef[17][lane] * z2 + work[54][lane]) + y3 * work[247][lane])));
+        work[242][lane] = work[20][lane] + (coef[19][lane] * x2 + work[50][lane]);
+        const double t154 = coef[20][lane] * x5 + t6;
+        work[29][lane] = x1 * t147;
+        work[30][lane] = x3 * work[234][lane];
+        work[5][lane] = coef[18][lane] * x2;
+        const double t158 = work[5][lane] + coef[14][lane] * x4;
+        work[243][lane] = y3 * t158;
+        work[244][lane] = work[29][lane] + (work[30][lane] + (work[243][lane] + work[31][lane]));
+        work[46][lane] = coef[0][lane] * x3;
+        work[72][lane] = coef[0][lane] * x1;
+        work[136][lane] = coef[4][lane] * z5;
+        const double t164 = t11 + work[136][lane];
+        work[15][lane] = x1 * t164;
+        work[235][lane] = coef[15][lane] * z4 + coef[16][lane] * z2;
+        work[16][lane] = x3 * work[235][lane];
+        work[248][lane] = z3 * t158;
+        work[249][lane] = work[15][lane] + (work[16][lane] + (work[17][lane] + work[248][lane]));
+        work[0][lane] = y1_ * (y3 * work[242][lane] + (t50 + (y1_ * t154 + t57))) + (z1 * (z3 * work[242][lane] + (t5 + (z1 * t154 + t14))) + (y3 * work[244][lane] + (work[46][lane] + (work[72][lane] + coef[17][lane] * x2) + z3 * work[249][lane])));
+        work[320][lane] = z2 * work[0][lane];
+        work[226][lane] = x2 * work[2][lane];
+        work[3][lane] = work[320][lane] - work[226][lane];
+        work[236][lane] = work[27][lane] + (coef[19][lane] * y2 + work[52][lane]);
+        const double t174 = coef[20][lane] * y5 + t20;
+        work[21][lane] = y1_ * t136;
+        work[6][lane] = coef[18][lane] * y2;
+        const double t177 = work[6][lane] + coef[14][lane] * y4;
+        work[237][lane] = x3 * t177;
+        work[22][lane] = y3 * work[245][lane] + t53;
+        work[238][lane] = work[21][lane] + (work[237][lane] + work[22][lane]);
+        work[49][lane] = coef[0][lane] * y3;
+        work[87][lane] = coef[0][lane] * y1_;
+        work[10][lane] = y1_ * t164;
+        work[11][lane] = y3 * work[235][lane];
+        work[250][lane] = z3 * t177;
+        work[251][lane] = work[10][lane] + (work[11][lane] + (work[250][lane] + work[12][lane]));
+        work[4][lane] = x1 * (x3 * work[236][lane] + (x1 * t174 + t92)) + (z1 * (z3 * work[236][lane] + (t19 + (z1 * t174 + t25))) + (x3 * work[238][lane] + (work[49][lane] + (work[87][lane] + coef[17][lane] * y2) + z3 * work[251][lane])));
+        work[1][lane] = x2 * work[4][lane];
+        increment[1][lane] = work[102][lane];
+        increment[2][lane] = work[111][lane];
+        displacement[0][lane] = work[104][lane] * work[105][lane] - 0.5 * work[172][lane];
+        increment[0][lane] = work[172][lane];
+        displacement[1][lane] = work[104][lane] * work[169][lane] - 0.5 * work[102][lane];
+        displacement[2][lane] = work[104][lane] * work[215][lane] - 0.5 * work[111][lane];
+        increment[4][lane] = work[3][lane];
+    }
+}
+
+/* spin_chain5_linearise_lanes_part2 (part 2 of 7) */
+spin_chain5_APART static void spin_chain5_linearise_lanes_part2(spin_chain5_lanes coef[restrict 33],
+                                                                spin_chain5_lanes y[restrict 15],
+                                                                spin_chain5_lanes displacement[restrict 15],
+                                                                spin_chain5_lanes increment[restrict 15],
+                                                                spin_chain5_lanes jacobian[restrict 225],
+                                                                spin_chain5_lanes increment_jacobian[restrict 225],
+                                                                spin_chain5_lanes work[restrict 517])
+{
+    (void)jacobian;
+    (void)increment_jacobian;
+    spin_chain5_EACH_LANE
+    for (int lane = 0; lane < spin_chain5_LANES; ++lane) {
+        const double x1 = y[0][lane];
+        const double y1_ = y[1][lane];
+        const double z1 = y[2][lane];
+        const double x2 = y[3][lane];
+        const double y2 = y[4][lane];
+        const double z2 = y[5][lane];
+        const double x3 = y[6][lane];
+        const double y3 = y[7][lane];
+        const double z3 = y[8][lane];
+        const double x4 = y[9][lane];
+        const double y4 = y[10][lane];
+        const double z4 = y[11][lane];
+        const double x5 = y[12][lane];
+        const double y5 = y[13][lane];
+        const double z5 = y[14][lane];
+        work[282][lane] = y2 * work[0][lane];
+        work[225][lane] = work[1][lane] - work[282][lane];
+        work[224][lane] = work[2][lane] * work[3][lane] - work[4][lane] * work[225][lane];
+        work[230][lane] = work[2][lane] * work[2][lane];
+        work[298][lane] = work[0][lane] * work[0][lane];
+        work[231][lane] = work[4][lane] * work[4][lane];
+        work[325][lane] = work[298][lane] + work[231][lane];
+        work[222][lane] = work[230][lane] + work[325][lane];
+        work[223][lane] = spin_chain5_phi0_lane(work[222][lane]);
+        work[289][lane] = y2 * work[2][lane];
+        work[322][lane] = z2 * work[4][lane];
+        work[290][lane] = work[289][lane] - work[322][lane];
+        work[283][lane] = work[0][lane] * work[225][lane] - work[2][lane] * work[290][lane];
+        work[319][lane] = work[4][lane] * work[290][lane] - work[0][lane] * work[3][lane];
+        work[342][lane] = work[5][lane] + coef[26][lane] * x4;
+        work[337][lane] = work[6][lane] + coef[26][lane] * y4;
+        const double t204 = work[7][lane] + work[8][lane];
+        const double t205 = x1 * t204;
+        const double t206 = coef[23][lane] * z4 + coef[15][lane] * z2;
+        const double t207 = x3 * t206;
+        const double t208 = coef[25][lane] * z3;
+        const double t209 = t208 + coef[21][lane] * z5;
+        work[344][lane] = x4 * t209;
+        const double t211 = coef[22][lane] * z4;
+        work[265][lane] = coef[4][lane] * z1;
+        work[361][lane] = t211 + work[265][lane];
+        const double t214 = x5 * work[361][lane];
+        work[345][lane] = t205 + (t207 + (work[344][lane] + t214));
+        const double t216 = coef[0][lane] * z4;
+        const double t217 = y1_ * t204;
+        const double t218 = y3 * t206;
+        const double t219 = y5 * work[361][lane];
+        work[351][lane] = y4 * t209;
+        work[352][lane] = t217 + (t218 + (t219 + work[351][lane]));
+        const double t222 = y2 * (z1 * work[9][lane] + (work[10][lane] + (work[11][lane] + (work[12][lane] + z3 * work[337][lane])))) + (x4 * work[345][lane] + (t216 + (coef[24][lane] * z3 + work[13][lane]) + y4 * work[352][lane]));
+        work[327][lane] = x2 * (z1 * work[14][lane] + (work[15][lane] + (work[16][lane] + (work[17][lane] + z3 * work[342][lane])))) + t222;
+        work[338][lane] = work[18][lane] + coef[26][lane] * z4;
+        const double t224 = work[19][lane] + work[20][lane];
+        const double t225 = y1_ * t224;
+        work[336][lane] = coef[23][lane] * x4 + coef[15][lane] * x2;
+        const double t227 = y3 * work[336][lane];
+        const double t228 = coef[25][lane] * x3;
+        const double t229 = t228 + coef[21][lane] * x5;
+        work[354][lane] = y4 * t229;
+        const double t231 = coef[22][lane] * x4;
+        work[273][lane] = coef[4][lane] * x1;
+        work[365][lane] = t231 + work[273][lane];
+        const double t234 = y5 * work[365][lane];
+        work[355][lane] = t225 + (t227 + (work[354][lane] + t234));
+        work[71][lane] = coef[0][lane] * x4;
+        const double t237 = z1 * t224;
+        const double t238 = z3 * work[336][lane];
+        work[357][lane] = z4 * t229;
+        const double t240 = z5 * work[365][lane];
+        work[358][lane] = t237 + (t238 + (work[357][lane] + t240));
+        work[333][lane] = y2 * (x1 * work[9][lane] + (work[21][lane] + (x3 * work[337][lane] + work[22][lane]))) + (z2 * (x1 * work[23][lane] + (work[24][lane] + (x3 * work[338][lane] + work[25][lane]))) + (y4 * work[355][lane] + (work[71][lane] + (work[26][lane] + coef[24][lane] * x3) + z4 * work[358][lane])));
+        work[410][lane] = z3 * work[333][lane];
+        work[329][lane] = x3 * work[327][lane];
+        work[328][lane] = work[410][lane] - work[329][lane];
+        const double t245 = work[27][lane] + work[28][lane];
+        const double t246 = x1 * t245;
+        work[341][lane] = coef[15][lane] * y2 + coef[23][lane] * y4;
+        const double t248 = x3 * work[341][lane];
+        const double t249 = coef[22][lane] * y4;
+        work[263][lane] = coef[4][lane] * y1_;
+        work[364][lane] = t249 + work[263][lane];
+        const double t252 = x5 * work[364][lane];
+        const double t253 = coef[25][lane] * y3;
+        const double t254 = coef[21][lane] * y5 + t253;
+        work[349][lane] = x4 * t254;
+        work[350][lane] = t246 + (t248 + (t252 + work[349][lane]));
+        work[88][lane] = coef[0][lane] * y4;
+        const double t258 = z1 * t245;
+        const double t259 = z3 * work[341][lane];
+        work[359][lane] = z4 * t254;
+        const double t261 = z5 * work[364][lane];
+        work[360][lane] = t258 + (t259 + (work[359][lane] + t261));
+        work[332][lane] = x2 * (y1_ * work[14][lane] + (work[29][lane] + (work[30][lane] + (work[31][lane] + y3 * work[342][lane])))) + (z2 * (y1_ * work[23][lane] + (work[32][lane] + (y3 * work[338][lane] + work[33][lane]))) + (x4 * work[350][lane] + (work[88][lane] + (coef[24][lane] * y3 + work[34][lane]) + z4 * work[360][lane])));
+        work[334][lane] = x3 * work[332][lane];
+        work[370][lane] = y3 * work[333][lane];
+        work[335][lane] = work[334][lane] - work[370][lane];
+        work[331][lane] = work[327][lane] * work[328][lane] - work[332][lane] * work[335][lane];
+        work[339][lane] = work[327][lane] * work[327][lane];
+        work[381][lane] = work[333][lane] * work[333][lane];
+        work[340][lane] = work[332][lane] * work[332][lane];
+        work[413][lane] = work[381][lane] + work[340][lane];
+        work[326][lane] = work[339][lane] + work[413][lane];
+        work[330][lane] = spin_chain5_phi0_lane(work[326][lane]);
+        work[368][lane] = y3 * work[327][lane];
+        work[405][lane] = z3 * work[332][lane];
+        work[369][lane] = work[368][lane] - work[405][lane];
+        work[367][lane] = work[333][lane] * work[335][lane] - work[327][lane] * work[369][lane];
+        work[403][lane] = work[332][lane] * work[369][lane] - work[333][lane] * work[328][lane];
+        work[260][lane] = coef[14][lane] * x3;
+        work[353][lane] = coef[3][lane] * x1;
+        const double t280 = work[20][lane] + (work[260][lane] + work[353][lane]);
+        work[430][lane] = coef[30][lane] * x5 + t228;
+        work[255][lane] = coef[14][lane] * y3;
+        work[348][lane] = coef[3][lane] * y1_;
+        const double t284 = work[27][lane] + (work[255][lane] + work[348][lane]);
+        work[424][lane] = coef[30][lane] * y5 + t253;
+        const double t286 = work[35][lane] + work[8][lane];
+        work[73][lane] = x1 * t286;
+        work[146][lane] = coef[2][lane] * x5;
+        work[434][lane] = coef[3][lane] * x2;
+        const double t290 = work[146][lane] + work[434][lane];
+        const double t291 = work[19][lane] + t231;
+        work[74][lane] = coef[27][lane] * work[36][lane] + coef[29][lane] * work[37][lane] + z3 * t291;
+        work[431][lane] = work[73][lane] + (z1 * t290 + work[74][lane]);
+        work[89][lane] = y1_ * t286;
+        work[139][lane] = coef[2][lane] * y5;
+        work[432][lane] = coef[3][lane] * y2;
+        const double t297 = work[139][lane] + work[432][lane];
+        const double t298 = t249 + work[28][lane];
+        work[90][lane] = coef[29][lane] * work[38][lane] + coef[27][lane] * work[39][lane] + z3 * t298;
+        work[436][lane] = work[89][lane] + (z1 * t297 + work[90][lane]);
+        const double t301 = y3 * (z2 * t284 + (t258 + (t259 + (t261 + z4 * work[424][lane])))) + (x5 * work[431][lane] + (work[40][lane] + (work[41][lane] + coef[28][lane] * z4) + y5 * work[436][lane]));
+        work[415][lane] = x3 * (z2 * t280 + (t237 + (t238 + (t240 + z4 * work[430][lane])))) + t301;
+        work[427][lane] = work[415][lane] * work[415][lane];
+        work[343][lane] = coef[3][lane] * z1;
+        work[254][lane] = coef[14][lane] * z3;
+        const double t305 = work[7][lane] + (work[343][lane] + work[254][lane]);
+        work[425][lane] = t208 + coef[30][lane] * z5;
+        const double t307 = work[19][lane] + work[42][lane];
+        work[83][lane] = y1_ * t307;
+        work[84][lane] = x3 * t298;
+        work[85][lane] = coef[27][lane] * work[43][lane] + coef[29][lane] * work[44][lane];
+        work[435][lane] = x1 * t297 + (work[83][lane] + (work[84][lane] + work[85][lane]));
+        work[140][lane] = coef[2][lane] * z5;
+        work[63][lane] = coef[3][lane] * z2;
+        const double t314 = work[140][lane] + work[63][lane];
+        const double t315 = z1 * t307;
+        const double t316 = coef[27][lane] * work[37][lane] + coef[29][lane] * work[36][lane];
+        const double t317 = t211 + work[8][lane];
+        const double t318 = x3 * t317;
+        work[437][lane] = x1 * t314 + (t315 + (t316 + t318));
+        const double t320 = z3 * (x2 * t305 + (t205 + (t207 + (x4 * work[425][lane] + t214)))) + (y5 * work[435][lane] + (work[45][lane] + (coef[28][lane] * x4 + work[46][lane]) + z5 * work[437][lane]));
+        work[417][lane] = y3 * (x2 * t284 + (t246 + (t248 + (t252 + x4 * work[424][lane])))) + t320;
+        work[443][lane] = work[417][lane] * work[417][lane];
+        const double t322 = work[28][lane] + work[47][lane];
+        work[68][lane] = x1 * t322;
+        work[70][lane] = coef[27][lane] * work[44][lane] + coef[29][lane] * work[43][lane] + y3 * t291;
+        work[433][lane] = work[68][lane] + (y1_ * t290 + work[70][lane]);
+        const double t326 = z1 * t322;
+        const double t327 = coef[29][lane] * work[39][lane] + coef[27][lane] * work[38][lane];
+        const double t328 = y3 * t317;
+        work[438][lane] = y1_ * t314 + (t326 + (t327 + t328));
+        const double t330 = z3 * (y2 * t305 + (t217 + (t218 + (y4 * work[425][lane] + t219)))) + (x5 * work[433][lane] + (work[48][lane] + (work[49][lane] + coef[28][lane] * y4) + z5 * work[438][lane]));
+        work[414][lane] = x3 * (y2 * t280 + (t225 + (t227 + (y4 * work[430][lane] + t234)))) + t330;
+        work[428][lane] = work[414][lane] * work[414][lane];
+        work[447][lane] = work[443][lane] + work[428][lane];
+        work[416][lane] = work[427][lane] + work[447][lane];
+        work[418][lane] = spin_chain5_phi0_lane(work[416][lane]);
+        work[445][lane] = z4 * work[417][lane];
+        work[421][lane] = x4 * work[415][lane];
+        work[420][lane] = work[445][lane] - work[421][lane];
+        work[422][lane] = x4 * work[414][lane];
+        work[439][lane] = y4 * work[417][lane];
+        work[423][lane] = work[422][lane] - work[439][lane];
+        work[419][lane] = work[415][lane] * work[420][lane] - work[414][lane] * work[423][lane];
+        work[441][lane] = y4 * work[415][lane];
+        work[446][lane] = z4 * work[414][lane];
+        work[442][lane] = work[441][lane] - work[446][lane];
+        work[440][lane] = work[417][lane] * work[423][lane] - work[415][lane] * work[442][lane];
+        work[444][lane] = work[414][lane] * work[442][lane] - work[417][lane] * work[420][lane];
+        work[276][lane] = coef[20][lane] * x1;
+        work[144][lane] = coef[3][lane] * x3;
+        work[91][lane] = work[50][lane] + (work[276][lane] + work[144][lane]);
+        work[95][lane] = work[51][lane] + coef[32][lane] * x4;
+        work[138][lane] = coef[3][lane] * y3;
+        work[261][lane] = coef[20][lane] * y1_;
+        work[75][lane] = work[52][lane] + (work[138][lane] + work[261][lane]);
+        work[78][lane] = coef[32][lane] * y4 + work[53][lane];
+        work[366][lane] = coef[21][lane] * x4;
+        work[86][lane] = work[366][lane] + work[434][lane];
+        work[363][lane] = coef[21][lane] * y4;
+        work[69][lane] = work[363][lane] + work[432][lane];
+        const double t359 = x4 * (t315 + (t318 + (t316 + z3 * work[86][lane]))) + (coef[31][lane] * z5 + (work[54][lane] + t216) + y4 * (t326 + (t328 + (z3 * work[69][lane] + t327))));
+        work[97][lane] = x1 * (z2 * work[91][lane] + (work[55][lane] + (work[56][lane] + (z5 * work[95][lane] + work[57][lane])))) + (y1_ * (z2 * work[75][lane] + (work[58][lane] + (work[59][lane] + (z5 * work[78][lane] + work[60][lane])))) + t359);
+        work[96][lane] = work[97][lane] * work[97][lane];
+        work[135][lane] = coef[3][lane] * z3;
+        work[262][lane] = coef[20][lane] * z1;
+        work[64][lane] = work[61][lane] + (work[135][lane] + work[262][lane]);
+        increment[5][lane] = work[225][lane];
+        displacement[3][lane] = work[224][lane] * work[223][lane] - 0.5 * work[290][lane];
+        increment[3][lane] = work[290][lane];
+        displacement[4][lane] = work[283][lane] * work[223][lane] - 0.5 * work[3][lane];
+        displacement[5][lane] = work[319][lane] * work[223][lane] - 0.5 * work[225][lane];
+        increment[7][lane] = work[328][lane];
+        increment[8][lane] = work[335][lane];
+        displacement[6][lane] = work[331][lane] * work[330][lane] - 0.5 * work[369][lane];
+        increment[6][lane] = work[369][lane];
+        displacement[7][lane] = work[367][lane] * work[330][lane] - 0.5 * work[328][lane];
+        displacement[8][lane] = work[403][lane] * work[330][lane] - 0.5 * work[335][lane];
+        increment[10][lane] = work[420][lane];
+        increment[11][lane] = work[423][lane];
+        displacement[9][lane] = work[418][lane] * work[419][lane] - 0.5 * work[442][lane];
+        increment[9][lane] = work[442][lane];
+        displacement[10][lane] = work[440][lane] * work[418][lane] - 0.5 * work[420][lane];
+        displacement[11][lane] = work[418][lane] * work[444][lane] - 0.5 * work[423][lane];
+    }
+}
+
+/* spin_chain5_linearise_lanes_part3 (part 3 of 7) */
+spin_chain5_APART static void spin_chain5_linearise_lanes_part3(spin_chain5_lanes coef[restrict 33],
+                                                                spin_chain5_lanes y[restrict 15],
+                                                                spin_chain5_lanes displacement[restrict 15],
+                                                                spin_chain5_lanes increment[restrict 15],
+                                                                spin_chain5_lanes jacobian[restrict 225],
+                                                                spin_chain5_lanes increment_jacobian[restrict 225],
+                                                                spin_chain5_lanes work[restrict 517])
+{
+    spin_chain5_EACH_LANE
+    for (int lane = 0; lane < spin_chain5_LANES; ++lane) {
+        const double x1 = y[0][lane];
+        const double y1_ = y[1][lane];
+        const double z1 = y[2][lane];
+        const double x2 = y[3][lane];
+        const double y2 = y[4][lane];
+        const double z2 = y[5][lane];
+        const double x3 = y[6][lane];
+        const double y3 = y[7][lane];
+        const double z3 = y[8][lane];
+        const double x4 = y[9][lane];
+        const double y4 = y[10][lane];
+        const double z4 = y[11][lane];
+        const double x5 = y[12][lane];
+        const double y5 = y[13][lane];
+        const double z5 = y[14][lane];
+        work[472][lane] = work[62][lane] + coef[32][lane] * z4;
+        work[362][lane] = coef[21][lane] * z4;
+        const double t366 = work[362][lane] + work[63][lane];
+        const double t367 = z1 * (x2 * work[64][lane] + (work[65][lane] + (work[66][lane] + (work[67][lane] + x5 * work[472][lane])))) + (y4 * (work[68][lane] + (x3 * work[69][lane] + work[70][lane])) + (coef[31][lane] * x5 + (work[71][lane] + work[72][lane]) + z4 * (work[73][lane] + (x3 * t366 + work[74][lane]))));
+        work[454][lane] = y1_ * (x2 * work[75][lane] + (work[76][lane] + (work[77][lane] + (x5 * work[78][lane] + work[79][lane])))) + t367;
+        work[507][lane] = work[454][lane] * work[454][lane];
+        const double t369 = z1 * (y2 * work[64][lane] + (work[80][lane] + (work[81][lane] + (y5 * work[472][lane] + work[82][lane])))) + (x4 * (work[83][lane] + (work[84][lane] + (work[85][lane] + y3 * work[86][lane]))) + (coef[31][lane] * y5 + (work[87][lane] + work[88][lane]) + z4 * (work[89][lane] + (y3 * t366 + work[90][lane]))));
+        work[453][lane] = x1 * (y2 * work[91][lane] + (work[92][lane] + (work[93][lane] + (work[94][lane] + y5 * work[95][lane])))) + t369;
+        work[473][lane] = work[453][lane] * work[453][lane];
+        work[513][lane] = work[507][lane] + work[473][lane];
+        work[448][lane] = work[96][lane] + work[513][lane];
+        work[451][lane] = spin_chain5_phi0_lane(work[448][lane]);
+        work[511][lane] = z5 * work[454][lane];
+        work[450][lane] = x5 * work[97][lane];
+        work[449][lane] = work[511][lane] - work[450][lane];
+        work[455][lane] = x5 * work[453][lane];
+        work[494][lane] = y5 * work[454][lane];
+        work[456][lane] = work[455][lane] - work[494][lane];
+        work[452][lane] = work[97][lane] * work[449][lane] - work[453][lane] * work[456][lane];
+        work[490][lane] = y5 * work[97][lane];
+        work[512][lane] = z5 * work[453][lane];
+        work[491][lane] = work[490][lane] - work[512][lane];
+        work[488][lane] = work[454][lane] * work[456][lane] - work[97][lane] * work[491][lane];
+        work[509][lane] = work[453][lane] * work[491][lane] - work[454][lane] * work[449][lane];
+        work[180][lane] = z5 * work[98][lane] + z2 * work[99][lane];
+        const double t387 = spin_chain5_phi1_lane(work[100][lane]);
+        work[170][lane] = work[101][lane] * t387;
+        work[216][lane] = 0.5 * y1_;
+        work[156][lane] = (work[102][lane] - work[103][lane]) * work[104][lane] + 2.0 * (work[105][lane] * work[170][lane]) - work[216][lane];
+        const double t391 = y2 * work[106][lane];
+        const double t392 = z2 * work[107][lane];
+        const double t393 = y5 * (coef[11][lane] * y5);
+        const double t394 = coef[10][lane] + z5 * (coef[11][lane] * z5);
+        work[182][lane] = t391 + (t392 + (t393 + t394));
+        work[214][lane] = y1_ * work[108][lane];
+        work[173][lane] = z1 * work[101][lane];
+        work[176][lane] = work[109][lane] * t387;
+        work[157][lane] = (work[214][lane] + work[173][lane]) * work[104][lane] + 2.0 * (work[105][lane] * work[176][lane]);
+        work[181][lane] = y5 * work[98][lane] + y2 * work[99][lane];
+        work[177][lane] = 0.5 * z1;
+        work[174][lane] = work[108][lane] * t387;
+        work[158][lane] = work[177][lane] + (2.0 * (work[105][lane] * work[174][lane]) - (work[110][lane] + work[111][lane]) * work[104][lane]);
+        work[179][lane] = work[108][lane] * work[109][lane] * work[104][lane];
+        work[178][lane] = 0.5 * work[101][lane];
+        work[183][lane] = z5 * work[114][lane] + z2 * work[115][lane];
+        const double t407 = x2 * work[116][lane];
+        const double t408 = x5 * (coef[11][lane] * x5);
+        work[184][lane] = t407 + (t392 + (t408 + t394));
+        work[220][lane] = 0.5 * work[108][lane];
+        work[219][lane] = work[101][lane] * work[109][lane] * work[104][lane];
+        work[213][lane] = t407 + (t391 + (t408 + (coef[10][lane] + t393)));
+        work[228][lane] = coef[13][lane] * z1;
+        const double t414 = work[228][lane] + coef[5][lane] * z3;
+        work[186][lane] = x2 * t414 + work[117][lane];
+        work[233][lane] = coef[9][lane] * y1_ + coef[6][lane] * y3;
+        const double t417 = y2 * work[233][lane];
+        const double t418 = z2 * (coef[6][lane] * z3 + coef[9][lane] * z1);
+        const double t419 = coef[8][lane] * y1_;
+        const double t420 = y5 * (work[118][lane] + t419);
+        const double t421 = coef[8][lane] * z1;
+        const double t422 = coef[0][lane] + z5 * (work[119][lane] + t421);
+        work[188][lane] = t417 + (t418 + (t420 + t422));
+        work[227][lane] = coef[13][lane] * y1_;
+        const double t425 = work[227][lane] + coef[5][lane] * y3;
+        work[187][lane] = x2 * t425 + work[120][lane];
+        work[189][lane] = y2 * t414 + work[121][lane];
+        work[232][lane] = coef[13][lane] * x1;
+        const double t429 = work[232][lane] + coef[5][lane] * x3;
+        work[191][lane] = y2 * t429 + work[122][lane];
+        work[229][lane] = coef[9][lane] * x1 + coef[6][lane] * x3;
+        const double t432 = x2 * work[229][lane];
+        work[164][lane] = coef[8][lane] * x1;
+        const double t434 = x5 * (work[123][lane] + work[164][lane]);
+        work[190][lane] = t432 + (t418 + (t434 + t422));
+        work[192][lane] = t432 + (t417 + (t434 + (coef[0][lane] + t420)));
+        work[194][lane] = z2 * t429 + work[124][lane];
+        work[193][lane] = z2 * t425 + work[125][lane];
+        work[195][lane] = x2 * work[126][lane] + x5 * work[127][lane];
+        const double t440 = y2 * work[9][lane];
+        const double t441 = z5 * work[128][lane];
+        const double t442 = y5 * work[129][lane];
+        const double t443 = z2 * work[23][lane];
+        work[197][lane] = t440 + (t441 + t442 + t443);
+        work[196][lane] = x5 * work[130][lane] + x2 * work[131][lane];
+        work[198][lane] = y5 * work[127][lane] + y2 * work[126][lane];
+        work[200][lane] = y2 * work[132][lane] + y5 * work[133][lane];
+        const double t448 = x2 * work[14][lane];
+        const double t449 = x5 * work[134][lane];
+        work[199][lane] = t448 + (t441 + t449 + t443);
+        work[201][lane] = t448 + (t449 + t442 + t440);
+        work[203][lane] = z2 * work[132][lane] + z5 * work[133][lane];
+        work[202][lane] = z2 * work[131][lane] + z5 * work[130][lane];
+        work[253][lane] = work[135][lane] + work[136][lane];
+        work[204][lane] = x5 * work[137][lane] + x2 * work[253][lane];
+        work[256][lane] = work[118][lane] + work[27][lane];
+        const double t457 = y2 * work[256][lane];
+        work[257][lane] = work[119][lane] + work[7][lane];
+        const double t459 = z2 * work[257][lane];
+        const double t460 = y5 * (work[138][lane] + work[139][lane]);
+        const double t461 = z5 * (work[135][lane] + work[140][lane]);
+        work[206][lane] = t457 + (t459 + (t460 + t461));
+        work[252][lane] = work[138][lane] + work[141][lane];
+        work[205][lane] = x2 * work[252][lane] + x5 * work[142][lane];
+        work[207][lane] = y5 * work[137][lane] + y2 * work[253][lane];
+        work[259][lane] = work[143][lane] + work[144][lane];
+        work[209][lane] = y5 * work[145][lane] + y2 * work[259][lane];
+        work[258][lane] = work[20][lane] + work[123][lane];
+        const double t469 = x2 * work[258][lane];
+        const double t470 = x5 * (work[146][lane] + work[144][lane]);
+        work[208][lane] = t469 + (t459 + (t470 + t461));
+        work[210][lane] = t469 + (t457 + (t460 + t470));
+        work[212][lane] = z2 * work[259][lane] + z5 * work[145][lane];
+        work[211][lane] = z2 * work[252][lane] + z5 * work[142][lane];
+        work[159][lane] = work[135][lane] + (coef[12][lane] * z1 + work[61][lane]);
+        work[153][lane] = x2 * work[159][lane] + (work[147][lane] + work[148][lane]);
+        work[264][lane] = work[129][lane] + t419;
+        work[149][lane] = y2 * work[264][lane];
+        work[266][lane] = work[128][lane] + t421;
+        work[150][lane] = z2 * work[266][lane];
+        work[474][lane] = coef[7][lane] * y1_ + coef[1][lane] * y4;
+        work[151][lane] = y5 * work[474][lane];
+        work[152][lane] = coef[0][lane] + z5 * (coef[7][lane] * z1 + coef[1][lane] * z4);
+        increment[13][lane] = work[449][lane];
+        increment[14][lane] = work[456][lane];
+        displacement[12][lane] = work[451][lane] * work[452][lane] - 0.5 * work[491][lane];
+        increment[12][lane] = work[491][lane];
+        displacement[13][lane] = work[488][lane] * work[451][lane] - 0.5 * work[449][lane];
+        displacement[14][lane] = work[451][lane] * work[509][lane] - 0.5 * work[456][lane];
+        increment_jacobian[15][lane] = z1 * work[182][lane] - x1 * work[180][lane] - work[101][lane];
+        increment_jacobian[30][lane] = x1 * work[181][lane] - y1_ * work[182][lane] + work[108][lane];
+        jacobian[0][lane] = 1.0 + (work[180][lane] * work[156][lane] + (work[182][lane] * work[157][lane] + work[181][lane] * work[158][lane]) - (work[112][lane] + work[113][lane]) * work[104][lane]);
+        jacobian[1][lane] = work[179][lane] - work[178][lane] + (work[183][lane] * work[156][lane] + (work[181][lane] * work[157][lane] + work[184][lane] * work[158][lane]));
+        increment_jacobian[1][lane] = y1_ * work[183][lane] - z1 * work[184][lane] + work[101][lane];
+        increment_jacobian[31][lane] = x1 * work[184][lane] - y1_ * work[181][lane] - work[109][lane];
+        jacobian[2][lane] = work[220][lane] + work[219][lane] + (work[213][lane] * work[156][lane] + (work[180][lane] * work[157][lane] + work[183][lane] * work[158][lane]));
+        increment_jacobian[2][lane] = y1_ * work[213][lane] - z1 * work[183][lane] - work[108][lane];
+        increment_jacobian[17][lane] = z1 * work[180][lane] - x1 * work[213][lane] + work[109][lane];
+        increment_jacobian[18][lane] = z1 * work[188][lane] - x1 * work[186][lane];
+        jacobian[3][lane] = work[186][lane] * work[156][lane] + (work[188][lane] * work[157][lane] + work[187][lane] * work[158][lane]);
+        increment_jacobian[3][lane] = y1_ * work[186][lane] - z1 * work[187][lane];
+        increment_jacobian[33][lane] = x1 * work[187][lane] - y1_ * work[188][lane];
+        increment_jacobian[77][lane] = x2 * work[189][lane] - y2 * work[186][lane];
+        increment_jacobian[19][lane] = z1 * work[191][lane] - x1 * work[189][lane];
+        increment_jacobian[75][lane] = x2 * work[191][lane] - y2 * work[188][lane];
+        jacobian[4][lane] = work[189][lane] * work[156][lane] + (work[191][lane] * work[157][lane] + work[190][lane] * work[158][lane]);
+        increment_jacobian[4][lane] = y1_ * work[189][lane] - z1 * work[190][lane];
+        increment_jacobian[34][lane] = x1 * work[190][lane] - y1_ * work[191][lane];
+        increment_jacobian[76][lane] = x2 * work[190][lane] - y2 * work[187][lane];
+        increment_jacobian[47][lane] = y2 * work[192][lane] - z2 * work[189][lane];
+        increment_jacobian[62][lane] = z2 * work[186][lane] - x2 * work[192][lane];
+        increment_jacobian[20][lane] = z1 * work[194][lane] - x1 * work[192][lane];
+        increment_jacobian[45][lane] = y2 * work[194][lane] - z2 * work[191][lane];
+        increment_jacobian[60][lane] = z2 * work[188][lane] - x2 * work[194][lane];
+        jacobian[5][lane] = work[192][lane] * work[156][lane] + (work[194][lane] * work[157][lane] + work[193][lane] * work[158][lane]);
+        increment_jacobian[5][lane] = y1_ * work[192][lane] - z1 * work[193][lane];
+        increment_jacobian[35][lane] = x1 * work[193][lane] - y1_ * work[194][lane];
+        increment_jacobian[46][lane] = y2 * work[193][lane] - z2 * work[190][lane];
+        increment_jacobian[61][lane] = z2 * work[187][lane] - x2 * work[193][lane];
+        increment_jacobian[21][lane] = z1 * work[197][lane] - x1 * work[195][lane];
+        jacobian[6][lane] = work[195][lane] * work[156][lane] + (work[197][lane] * work[157][lane] + work[196][lane] * work[158][lane]);
+        increment_jacobian[6][lane] = y1_ * work[195][lane] - z1 * work[196][lane];
+        increment_jacobian[36][lane] = x1 * work[196][lane] - y1_ * work[197][lane];
+        increment_jacobian[122][lane] = x3 * work[198][lane] - y3 * work[195][lane];
+        increment_jacobian[22][lane] = z1 * work[200][lane] - x1 * work[198][lane];
+        increment_jacobian[120][lane] = x3 * work[200][lane] - y3 * work[197][lane];
+        jacobian[7][lane] = work[198][lane] * work[156][lane] + (work[200][lane] * work[157][lane] + work[199][lane] * work[158][lane]);
+        increment_jacobian[7][lane] = y1_ * work[198][lane] - z1 * work[199][lane];
+        increment_jacobian[37][lane] = x1 * work[199][lane] - y1_ * work[200][lane];
+        increment_jacobian[121][lane] = x3 * work[199][lane] - y3 * work[196][lane];
+        increment_jacobian[92][lane] = y3 * work[201][lane] - z3 * work[198][lane];
+        increment_jacobian[107][lane] = z3 * work[195][lane] - x3 * work[201][lane];
+        increment_jacobian[23][lane] = z1 * work[203][lane] - x1 * work[201][lane];
+        increment_jacobian[90][lane] = y3 * work[203][lane] - z3 * work[200][lane];
+        increment_jacobian[105][lane] = z3 * work[197][lane] - x3 * work[203][lane];
+        jacobian[8][lane] = work[201][lane] * work[156][lane] + (work[203][lane] * work[157][lane] + work[202][lane] * work[158][lane]);
+        increment_jacobian[8][lane] = y1_ * work[201][lane] - z1 * work[202][lane];
+        increment_jacobian[38][lane] = x1 * work[202][lane] - y1_ * work[203][lane];
+        increment_jacobian[91][lane] = y3 * work[202][lane] - z3 * work[199][lane];
+        increment_jacobian[106][lane] = z3 * work[196][lane] - x3 * work[202][lane];
+        increment_jacobian[24][lane] = z1 * work[206][lane] - x1 * work[204][lane];
+        jacobian[9][lane] = work[204][lane] * work[156][lane] + (work[206][lane] * work[157][lane] + work[205][lane] * work[158][lane]);
+        increment_jacobian[9][lane] = y1_ * work[204][lane] - z1 * work[205][lane];
+        increment_jacobian[39][lane] = x1 * work[205][lane] - y1_ * work[206][lane];
+        increment_jacobian[167][lane] = x4 * work[207][lane] - y4 * work[204][lane];
+        increment_jacobian[25][lane] = z1 * work[209][lane] - x1 * work[207][lane];
+        increment_jacobian[165][lane] = x4 * work[209][lane] - y4 * work[206][lane];
+        jacobian[10][lane] = work[207][lane] * work[156][lane] + (work[209][lane] * work[157][lane] + work[208][lane] * work[158][lane]);
+        increment_jacobian[10][lane] = y1_ * work[207][lane] - z1 * work[208][lane];
+        increment_jacobian[40][lane] = x1 * work[208][lane] - y1_ * work[209][lane];
+        increment_jacobian[166][lane] = x4 * work[208][lane] - y4 * work[205][lane];
+        increment_jacobian[137][lane] = y4 * work[210][lane] - z4 * work[207][lane];
+        increment_jacobian[152][lane] = z4 * work[204][lane] - x4 * work[210][lane];
+        increment_jacobian[26][lane] = z1 * work[212][lane] - x1 * work[210][lane];
+        increment_jacobian[135][lane] = y4 * work[212][lane] - z4 * work[209][lane];
+        increment_jacobian[150][lane] = z4 * work[206][lane] - x4 * work[212][lane];
+        jacobian[11][lane] = work[210][lane] * work[156][lane] + (work[212][lane] * work[157][lane] + work[211][lane] * work[158][lane]);
+        increment_jacobian[11][lane] = y1_ * work[210][lane] - z1 * work[211][lane];
+        increment_jacobian[41][lane] = x1 * work[211][lane] - y1_ * work[212][lane];
+        increment_jacobian[136][lane] = y4 * work[211][lane] - z4 * work[208][lane];
+        increment_jacobian[151][lane] = z4 * work[205][lane] - x4 * work[211][lane];
+    }
+}
+
+/* spin_chain5_linearise_lanes_part4 (part 4 of 7) */
+spin_chain5_APART static void spin_chain5_linearise_lanes_part4(spin_chain5_lanes coef[restrict 33],
+                                                                spin_chain5_lanes y[restrict 15],
+                                                                spin_chain5_lanes displacement[restrict 15],
+                                                                spin_chain5_lanes increment[restrict 15],
+                                                                spin_chain5_lanes jacobian[restrict 225],
+                                                                spin_chain5_lanes increment_jacobian[restrict 225],
+                                                                spin_chain5_lanes work[restrict 517])
+{
+    (void)displacement;
+    (void)increment;
+    spin_chain5_EACH_LANE
+    for (int lane = 0; lane < spin_chain5_LANES; ++lane) {
+        const double x1 = y[0][lane];
+        const double y1_ = y[1][lane];
+        const double z1 = y[2][lane];
+        const double x2 = y[3][lane];
+        const double y2 = y[4][lane];
+        const double z2 = y[5][lane];
+        const double x3 = y[6][lane];
+        const double y3 = y[7][lane];
+        const double z3 = y[8][lane];
+        const double x4 = y[9][lane];
+        const double y4 = y[10][lane];
+        const double z4 = y[11][lane];
+        const double x5 = y[12][lane];
+        const double y5 = y[13][lane];
+        const double z5 = y[14][lane];
+        work[458][lane] = work[149][lane] + (work[150][lane] + (work[151][lane] + work[152][lane]));
+        const double t485 = work[138][lane] + (coef[12][lane] * y1_ + work[52][lane]);
+        work[461][lane] = x2 * t485 + (work[154][lane] + work[155][lane]);
+        work[464][lane] = y2 * work[159][lane] + (work[160][lane] + work[161][lane]);
+        const double t488 = work[144][lane] + (coef[12][lane] * x1 + work[50][lane]);
+        work[459][lane] = y2 * t488 + (work[162][lane] + work[163][lane]);
+        work[274][lane] = work[134][lane] + work[164][lane];
+        const double t491 = x2 * work[274][lane];
+        work[471][lane] = coef[7][lane] * x1 + coef[1][lane] * x4;
+        const double t493 = x5 * work[471][lane];
+        work[462][lane] = t491 + (work[150][lane] + (t493 + work[152][lane]));
+        work[463][lane] = t491 + (work[149][lane] + (t493 + (coef[0][lane] + work[151][lane])));
+        work[457][lane] = z2 * t488 + (work[165][lane] + work[166][lane]);
+        work[460][lane] = z2 * t485 + (work[167][lane] + work[168][lane]);
+        const double t498 = 0.5 * x1;
+        const double t499 = t498 + (2.0 * (work[169][lane] * work[170][lane]) - (work[171][lane] + work[172][lane]) * work[104][lane]);
+        const double t500 = x1 * work[109][lane];
+        const double t501 = (t500 + work[173][lane]) * work[104][lane] + 2.0 * (work[169][lane] * work[174][lane]);
+        const double t502 = (work[111][lane] - work[175][lane]) * work[104][lane] + 2.0 * (work[169][lane] * work[176][lane]) - work[177][lane];
+        const double t503 = work[108][lane] * work[101][lane] * work[104][lane];
+        const double t504 = 0.5 * work[109][lane];
+        const double t505 = (t500 + work[214][lane]) * work[104][lane] + 2.0 * (work[215][lane] * work[170][lane]);
+        const double t506 = work[216][lane] + (2.0 * (work[215][lane] * work[176][lane]) - (work[217][lane] + work[102][lane]) * work[104][lane]);
+        const double t507 = (work[172][lane] - work[218][lane]) * work[104][lane] + 2.0 * (work[215][lane] * work[174][lane]) - t498;
+        work[321][lane] = y2 * work[4][lane];
+        work[286][lane] = z2 * work[2][lane];
+        const double t510 = spin_chain5_phi1_lane(work[222][lane]);
+        work[284][lane] = work[0][lane] * t510;
+        work[268][lane] = (work[321][lane] + work[286][lane]) * work[223][lane] + 2.0 * (work[224][lane] * work[284][lane]);
+        work[285][lane] = 0.5 * z2;
+        work[287][lane] = work[4][lane] * t510;
+        work[270][lane] = work[285][lane] + (2.0 * (work[224][lane] * work[287][lane]) - (work[1][lane] + work[225][lane]) * work[223][lane]);
+        work[288][lane] = work[2][lane] * t510;
+        work[318][lane] = 0.5 * y2;
+        work[272][lane] = (work[3][lane] - work[226][lane]) * work[223][lane] + 2.0 * (work[224][lane] * work[288][lane]) - work[318][lane];
+        const double t519 = y1_ * (work[227][lane] + coef[19][lane] * y3);
+        const double t520 = z1 * (work[228][lane] + coef[19][lane] * z3);
+        const double t521 = y3 * (coef[18][lane] * y3);
+        const double t522 = coef[17][lane] + z3 * (coef[18][lane] * z3);
+        work[293][lane] = t519 + (t520 + (t521 + t522));
+        const double t524 = coef[16][lane] * x3 + coef[6][lane] * x1;
+        work[295][lane] = z1 * work[229][lane] + z3 * t524;
+        work[294][lane] = y1_ * work[229][lane] + y3 * t524;
+        work[292][lane] = work[0][lane] * work[4][lane] * work[223][lane];
+        work[291][lane] = 0.5 * work[2][lane];
+        const double t529 = x1 * (work[232][lane] + coef[19][lane] * x3);
+        const double t530 = x3 * (coef[18][lane] * x3);
+        work[296][lane] = t529 + (t520 + (t530 + t522));
+        work[297][lane] = z1 * work[233][lane] + z3 * (coef[6][lane] * y1_ + coef[16][lane] * y3);
+        work[324][lane] = 0.5 * work[4][lane];
+        work[323][lane] = work[0][lane] * work[2][lane] * work[223][lane];
+        work[317][lane] = t529 + (t519 + (t530 + (coef[17][lane] + t521)));
+        const double t536 = y1_ * work[131][lane];
+        const double t537 = z1 * work[126][lane];
+        const double t538 = y3 * work[234][lane];
+        const double t539 = coef[0][lane] + z3 * work[235][lane];
+        work[299][lane] = t536 + (t537 + (t538 + t539));
+        work[300][lane] = x1 * work[236][lane] + (work[237][lane] + work[238][lane]);
+        work[301][lane] = x1 * work[239][lane] + (work[240][lane] + work[241][lane]);
+        work[302][lane] = y1_ * work[242][lane] + (work[243][lane] + work[244][lane]);
+        const double t544 = x1 * work[132][lane];
+        const double t545 = x3 * work[245][lane];
+        work[303][lane] = t544 + (t537 + (t545 + t539));
+        work[304][lane] = y1_ * work[239][lane] + (work[246][lane] + work[247][lane]);
+        work[305][lane] = z1 * work[242][lane] + (work[248][lane] + work[249][lane]);
+        work[306][lane] = z1 * work[236][lane] + (work[250][lane] + work[251][lane]);
+        work[307][lane] = t544 + (t536 + (t545 + (coef[0][lane] + t538)));
+        const double t551 = y1_ * work[252][lane];
+        const double t552 = z1 * work[253][lane];
+        const double t553 = z3 * (work[7][lane] + work[254][lane]);
+        const double t554 = y3 * (work[255][lane] + work[27][lane]);
+        work[308][lane] = t551 + (t552 + (t553 + t554));
+        work[346][lane] = coef[15][lane] * y3 + work[141][lane];
+        work[309][lane] = x1 * work[256][lane] + x3 * work[346][lane];
+        work[347][lane] = coef[15][lane] * z3 + work[136][lane];
+        work[310][lane] = x1 * work[257][lane] + x3 * work[347][lane];
+        work[356][lane] = work[143][lane] + coef[15][lane] * x3;
+        work[311][lane] = y1_ * work[258][lane] + y3 * work[356][lane];
+        const double t562 = x1 * work[259][lane];
+        const double t563 = x3 * (work[260][lane] + work[20][lane]);
+        work[312][lane] = t562 + (t552 + (t563 + t553));
+        work[313][lane] = y1_ * work[257][lane] + y3 * work[347][lane];
+        work[314][lane] = z3 * work[356][lane] + z1 * work[258][lane];
+        work[316][lane] = t562 + (t551 + (t563 + t554));
+        work[315][lane] = z3 * work[346][lane] + z1 * work[256][lane];
+        work[281][lane] = y1_ * (work[138][lane] + (work[52][lane] + work[261][lane]));
+        work[280][lane] = y3 * work[129][lane];
+        work[277][lane] = z3 * work[128][lane];
+        work[278][lane] = z1 * (work[135][lane] + (work[262][lane] + work[61][lane]));
+        work[267][lane] = work[281][lane] + (work[280][lane] + work[277][lane] + work[278][lane]);
+        work[279][lane] = work[263][lane] + work[52][lane];
+        work[269][lane] = x3 * work[279][lane] + x1 * work[264][lane];
+        work[275][lane] = work[61][lane] + work[265][lane];
+        work[271][lane] = x3 * work[275][lane] + x1 * work[266][lane];
+        increment_jacobian[27][lane] = z1 * work[458][lane] - x1 * work[153][lane];
+        jacobian[12][lane] = work[153][lane] * work[156][lane] + (work[458][lane] * work[157][lane] + work[461][lane] * work[158][lane]);
+        increment_jacobian[12][lane] = y1_ * work[153][lane] - z1 * work[461][lane];
+        increment_jacobian[42][lane] = x1 * work[461][lane] - y1_ * work[458][lane];
+        increment_jacobian[212][lane] = x5 * work[464][lane] - y5 * work[153][lane];
+        increment_jacobian[28][lane] = z1 * work[459][lane] - x1 * work[464][lane];
+        increment_jacobian[210][lane] = x5 * work[459][lane] - y5 * work[458][lane];
+        jacobian[13][lane] = work[464][lane] * work[156][lane] + (work[459][lane] * work[157][lane] + work[462][lane] * work[158][lane]);
+        increment_jacobian[13][lane] = y1_ * work[464][lane] - z1 * work[462][lane];
+        increment_jacobian[43][lane] = x1 * work[462][lane] - y1_ * work[459][lane];
+        increment_jacobian[211][lane] = x5 * work[462][lane] - y5 * work[461][lane];
+        increment_jacobian[182][lane] = y5 * work[463][lane] - z5 * work[464][lane];
+        increment_jacobian[197][lane] = z5 * work[153][lane] - x5 * work[463][lane];
+        increment_jacobian[29][lane] = z1 * work[457][lane] - x1 * work[463][lane];
+        increment_jacobian[180][lane] = y5 * work[457][lane] - z5 * work[459][lane];
+        increment_jacobian[195][lane] = z5 * work[458][lane] - x5 * work[457][lane];
+        jacobian[14][lane] = work[463][lane] * work[156][lane] + (work[457][lane] * work[157][lane] + work[460][lane] * work[158][lane]);
+        increment_jacobian[14][lane] = y1_ * work[463][lane] - z1 * work[460][lane];
+        increment_jacobian[44][lane] = x1 * work[460][lane] - y1_ * work[457][lane];
+        increment_jacobian[181][lane] = y5 * work[460][lane] - z5 * work[462][lane];
+        increment_jacobian[196][lane] = z5 * work[461][lane] - x5 * work[460][lane];
+        jacobian[15][lane] = work[178][lane] + work[179][lane] + (work[180][lane] * t499 + (work[181][lane] * t501 + work[182][lane] * t502));
+        jacobian[16][lane] = 1.0 + (work[183][lane] * t499 + (work[184][lane] * t501 + work[181][lane] * t502) - (work[185][lane] + work[113][lane]) * work[104][lane]);
+        jacobian[18][lane] = work[186][lane] * t499 + (work[187][lane] * t501 + work[188][lane] * t502);
+        jacobian[19][lane] = work[189][lane] * t499 + (work[190][lane] * t501 + work[191][lane] * t502);
+        jacobian[20][lane] = work[192][lane] * t499 + (work[193][lane] * t501 + work[194][lane] * t502);
+        jacobian[21][lane] = work[195][lane] * t499 + (work[196][lane] * t501 + work[197][lane] * t502);
+        jacobian[22][lane] = work[198][lane] * t499 + (work[199][lane] * t501 + work[200][lane] * t502);
+        jacobian[23][lane] = work[201][lane] * t499 + (work[202][lane] * t501 + work[203][lane] * t502);
+        jacobian[24][lane] = work[204][lane] * t499 + (work[205][lane] * t501 + work[206][lane] * t502);
+        jacobian[25][lane] = work[207][lane] * t499 + (work[208][lane] * t501 + work[209][lane] * t502);
+        jacobian[26][lane] = work[210][lane] * t499 + (work[211][lane] * t501 + work[212][lane] * t502);
+        jacobian[27][lane] = work[153][lane] * t499 + (work[461][lane] * t501 + work[458][lane] * t502);
+        jacobian[28][lane] = work[464][lane] * t499 + (work[462][lane] * t501 + work[459][lane] * t502);
+        jacobian[29][lane] = work[463][lane] * t499 + (work[460][lane] * t501 + work[457][lane] * t502);
+        jacobian[17][lane] = t503 - t504 + (work[213][lane] * t499 + (work[183][lane] * t501 + work[180][lane] * t502));
+        jacobian[30][lane] = work[219][lane] - work[220][lane] + (work[180][lane] * t505 + (work[182][lane] * t506 + work[181][lane] * t507));
+        jacobian[31][lane] = t504 + t503 + (work[183][lane] * t505 + (work[184][lane] * t507 + work[181][lane] * t506));
+        jacobian[32][lane] = 1.0 + (work[213][lane] * t505 + (work[180][lane] * t506 + work[183][lane] * t507) - work[221][lane] * work[104][lane]);
+        jacobian[33][lane] = work[186][lane] * t505 + (work[188][lane] * t506 + work[187][lane] * t507);
+        jacobian[34][lane] = work[189][lane] * t505 + (work[191][lane] * t506 + work[190][lane] * t507);
+        jacobian[35][lane] = work[192][lane] * t505 + (work[193][lane] * t507 + work[194][lane] * t506);
+        jacobian[36][lane] = work[195][lane] * t505 + (work[196][lane] * t507 + work[197][lane] * t506);
+        jacobian[37][lane] = work[198][lane] * t505 + (work[199][lane] * t507 + work[200][lane] * t506);
+        jacobian[38][lane] = work[201][lane] * t505 + (work[202][lane] * t507 + work[203][lane] * t506);
+        jacobian[39][lane] = work[204][lane] * t505 + (work[206][lane] * t506 + work[205][lane] * t507);
+        jacobian[40][lane] = work[207][lane] * t505 + (work[209][lane] * t506 + work[208][lane] * t507);
+        jacobian[41][lane] = work[210][lane] * t505 + (work[211][lane] * t507 + work[212][lane] * t506);
+        jacobian[42][lane] = work[153][lane] * t505 + (work[461][lane] * t507 + work[458][lane] * t506);
+        jacobian[43][lane] = work[464][lane] * t505 + (work[459][lane] * t506 + work[462][lane] * t507);
+        jacobian[44][lane] = work[463][lane] * t505 + (work[457][lane] * t506 + work[460][lane] * t507);
+        jacobian[45][lane] = work[188][lane] * work[268][lane] + (work[191][lane] * work[270][lane] + work[194][lane] * work[272][lane]);
+        jacobian[46][lane] = work[187][lane] * work[268][lane] + (work[193][lane] * work[272][lane] + work[190][lane] * work[270][lane]);
+        jacobian[47][lane] = work[186][lane] * work[268][lane] + (work[189][lane] * work[270][lane] + work[192][lane] * work[272][lane]);
+        increment_jacobian[63][lane] = z2 * work[293][lane] - x2 * work[295][lane] - work[2][lane];
+        jacobian[48][lane] = 1.0 + (work[293][lane] * work[268][lane] + (work[295][lane] * work[272][lane] + work[294][lane] * work[270][lane]) - (work[230][lane] + work[231][lane]) * work[223][lane]);
+        increment_jacobian[78][lane] = x2 * work[294][lane] - y2 * work[293][lane] + work[4][lane];
+        increment_jacobian[79][lane] = x2 * work[296][lane] - y2 * work[294][lane] - work[0][lane];
+        jacobian[49][lane] = work[292][lane] - work[291][lane] + (work[294][lane] * work[268][lane] + (work[296][lane] * work[270][lane] + work[297][lane] * work[272][lane]));
+        increment_jacobian[49][lane] = y2 * work[297][lane] - z2 * work[296][lane] + work[2][lane];
+        jacobian[50][lane] = work[324][lane] + work[323][lane] + (work[295][lane] * work[268][lane] + (work[317][lane] * work[272][lane] + work[297][lane] * work[270][lane]));
+        increment_jacobian[50][lane] = y2 * work[317][lane] - z2 * work[297][lane] - work[4][lane];
+        increment_jacobian[65][lane] = z2 * work[295][lane] - x2 * work[317][lane] + work[0][lane];
+        increment_jacobian[81][lane] = x2 * work[300][lane] - y2 * work[299][lane];
+        jacobian[51][lane] = work[299][lane] * work[268][lane] + (work[300][lane] * work[270][lane] + work[301][lane] * work[272][lane]);
+        increment_jacobian[51][lane] = y2 * work[301][lane] - z2 * work[300][lane];
+        increment_jacobian[66][lane] = z2 * work[299][lane] - x2 * work[301][lane];
+        increment_jacobian[123][lane] = x3 * work[302][lane] - y3 * work[299][lane];
+        increment_jacobian[82][lane] = x2 * work[303][lane] - y2 * work[302][lane];
+        increment_jacobian[124][lane] = x3 * work[303][lane] - y3 * work[300][lane];
+        jacobian[52][lane] = work[302][lane] * work[268][lane] + (work[303][lane] * work[270][lane] + work[304][lane] * work[272][lane]);
+        increment_jacobian[52][lane] = y2 * work[304][lane] - z2 * work[303][lane];
+        increment_jacobian[67][lane] = z2 * work[302][lane] - x2 * work[304][lane];
+        increment_jacobian[125][lane] = x3 * work[304][lane] - y3 * work[301][lane];
+        increment_jacobian[93][lane] = y3 * work[305][lane] - z3 * work[302][lane];
+        increment_jacobian[108][lane] = z3 * work[299][lane] - x3 * work[305][lane];
+        increment_jacobian[83][lane] = x2 * work[306][lane] - y2 * work[305][lane];
+        increment_jacobian[94][lane] = y3 * work[306][lane] - z3 * work[303][lane];
+        increment_jacobian[109][lane] = z3 * work[300][lane] - x3 * work[306][lane];
+        jacobian[53][lane] = work[305][lane] * work[268][lane] + (work[306][lane] * work[270][lane] + work[307][lane] * work[272][lane]);
+        increment_jacobian[53][lane] = y2 * work[307][lane] - z2 * work[306][lane];
+        increment_jacobian[68][lane] = z2 * work[305][lane] - x2 * work[307][lane];
+        increment_jacobian[95][lane] = y3 * work[307][lane] - z3 * work[304][lane];
+        increment_jacobian[110][lane] = z3 * work[301][lane] - x3 * work[307][lane];
+        increment_jacobian[84][lane] = x2 * work[309][lane] - y2 * work[308][lane];
+        jacobian[54][lane] = work[308][lane] * work[268][lane] + (work[309][lane] * work[270][lane] + work[310][lane] * work[272][lane]);
+        increment_jacobian[54][lane] = y2 * work[310][lane] - z2 * work[309][lane];
+        increment_jacobian[69][lane] = z2 * work[308][lane] - x2 * work[310][lane];
+        increment_jacobian[168][lane] = x4 * work[311][lane] - y4 * work[308][lane];
+        increment_jacobian[85][lane] = x2 * work[312][lane] - y2 * work[311][lane];
+        increment_jacobian[169][lane] = x4 * work[312][lane] - y4 * work[309][lane];
+        jacobian[55][lane] = work[311][lane] * work[268][lane] + (work[312][lane] * work[270][lane] + work[313][lane] * work[272][lane]);
+        increment_jacobian[55][lane] = y2 * work[313][lane] - z2 * work[312][lane];
+        increment_jacobian[70][lane] = z2 * work[311][lane] - x2 * work[313][lane];
+        increment_jacobian[170][lane] = x4 * work[313][lane] - y4 * work[310][lane];
+        increment_jacobian[138][lane] = y4 * work[314][lane] - z4 * work[311][lane];
+        increment_jacobian[153][lane] = z4 * work[308][lane] - x4 * work[314][lane];
+        increment_jacobian[71][lane] = z2 * work[314][lane] - x2 * work[316][lane];
+        increment_jacobian[140][lane] = y4 * work[316][lane] - z4 * work[313][lane];
+        increment_jacobian[155][lane] = z4 * work[310][lane] - x4 * work[316][lane];
+        jacobian[56][lane] = work[314][lane] * work[268][lane] + (work[316][lane] * work[272][lane] + work[315][lane] * work[270][lane]);
+        increment_jacobian[56][lane] = y2 * work[316][lane] - z2 * work[315][lane];
+        increment_jacobian[86][lane] = x2 * work[315][lane] - y2 * work[314][lane];
+        increment_jacobian[139][lane] = y4 * work[315][lane] - z4 * work[312][lane];
+        increment_jacobian[154][lane] = z4 * work[309][lane] - x4 * work[315][lane];
+        increment_jacobian[87][lane] = x2 * work[269][lane] - y2 * work[267][lane];
+    }
+}
+
+/* spin_chain5_linearise_lanes_part5 (part 5 of 7) */
+spin_chain5_APART static void spin_chain5_linearise_lanes_part5(spin_chain5_lanes coef[restrict 33],
+                                                                spin_chain5_lanes y[restrict 15],
+                                                                spin_chain5_lanes displacement[restrict 15],
+                                                                spin_chain5_lanes increment[restrict 15],
+                                                                spin_chain5_lanes jacobian[restrict 225],
+                                                                spin_chain5_lanes increment_jacobian[restrict 225],
+                                                                spin_chain5_lanes work[restrict 517])
+{
+    (void)displacement;
+    (void)increment;
+    spin_chain5_EACH_LANE
+    for (int lane = 0; lane < spin_chain5_LANES; ++lane) {
+        const double x1 = y[0][lane];
+        const double y1_ = y[1][lane];
+        const double z1 = y[2][lane];
+        const double x2 = y[3][lane];
+        const double y2 = y[4][lane];
+        const double z2 = y[5][lane];
+        const double x3 = y[6][lane];
+        const double y3 = y[7][lane];
+        const double z3 = y[8][lane];
+        const double x4 = y[9][lane];
+        const double y4 = y[10][lane];
+        const double z4 = y[11][lane];
+        const double x5 = y[12][lane];
+        const double y5 = y[13][lane];
+        const double z5 = y[14][lane];
+        const double t578 = work[50][lane] + work[273][lane];
+        work[466][lane] = y3 * t578 + y1_ * work[274][lane];
+        work[470][lane] = y1_ * work[266][lane] + y3 * work[275][lane];
+        const double t581 = x1 * (work[144][lane] + (work[50][lane] + work[276][lane]));
+        const double t582 = x3 * work[134][lane];
+        work[468][lane] = t581 + (t582 + work[277][lane] + work[278][lane]);
+        work[465][lane] = z3 * t578 + z1 * work[274][lane];
+        work[467][lane] = z1 * work[264][lane] + z3 * work[279][lane];
+        work[469][lane] = t581 + (work[280][lane] + t582 + work[281][lane]);
+        const double t587 = (work[225][lane] - work[282][lane]) * work[223][lane] + 2.0 * (work[283][lane] * work[284][lane]) - work[285][lane];
+        const double t588 = x2 * work[0][lane];
+        const double t589 = (t588 + work[286][lane]) * work[223][lane] + 2.0 * (work[283][lane] * work[287][lane]);
+        const double t590 = 0.5 * x2;
+        const double t591 = t590 + (2.0 * (work[283][lane] * work[288][lane]) - (work[289][lane] + work[290][lane]) * work[223][lane]);
+        const double t592 = work[4][lane] * work[2][lane] * work[223][lane];
+        const double t593 = 0.5 * work[0][lane];
+        const double t594 = work[318][lane] + (2.0 * (work[319][lane] * work[284][lane]) - (work[320][lane] + work[3][lane]) * work[223][lane]);
+        const double t595 = (work[321][lane] + t588) * work[223][lane] + 2.0 * (work[319][lane] * work[288][lane]);
+        const double t596 = (work[290][lane] - work[322][lane]) * work[223][lane] + 2.0 * (work[319][lane] * work[287][lane]) - t590;
+        const double t597 = spin_chain5_phi1_lane(work[326][lane]);
+        work[404][lane] = work[327][lane] * t597;
+        work[408][lane] = 0.5 * y3;
+        const double t600 = (work[328][lane] - work[329][lane]) * work[330][lane] + 2.0 * (work[331][lane] * work[404][lane]) - work[408][lane];
+        const double t601 = z3 * work[327][lane];
+        work[401][lane] = y3 * work[332][lane];
+        work[409][lane] = work[333][lane] * t597;
+        const double t604 = (t601 + work[401][lane]) * work[330][lane] + 2.0 * (work[331][lane] * work[409][lane]);
+        const double t605 = 0.5 * z3;
+        work[406][lane] = work[332][lane] * t597;
+        const double t607 = t605 + (2.0 * (work[331][lane] * work[406][lane]) - (work[334][lane] + work[335][lane]) * work[330][lane]);
+        work[376][lane] = z4 * work[336][lane] + z2 * work[245][lane];
+        const double t609 = y2 * work[337][lane];
+        const double t610 = z2 * work[338][lane];
+        const double t611 = y4 * (coef[25][lane] * y4);
+        const double t612 = coef[24][lane] + z4 * (coef[25][lane] * z4);
+        work[378][lane] = t609 + (t610 + (t611 + t612));
+        work[377][lane] = y2 * work[245][lane] + y4 * work[336][lane];
+        work[375][lane] = work[332][lane] * work[333][lane] * work[330][lane];
+        work[374][lane] = 0.5 * work[327][lane];
+        work[379][lane] = z4 * work[341][lane] + z2 * work[234][lane];
+        const double t618 = x2 * work[342][lane];
+        const double t619 = x4 * (coef[25][lane] * x4);
+        work[380][lane] = t618 + (t610 + (t619 + t612));
+        work[412][lane] = 0.5 * work[332][lane];
+        work[411][lane] = work[327][lane] * work[333][lane] * work[330][lane];
+        work[400][lane] = t618 + (t609 + (t619 + (coef[24][lane] + t611)));
+        const double t624 = work[343][lane] + (coef[26][lane] * z3 + work[7][lane]);
+        work[382][lane] = x2 * t624 + (work[344][lane] + work[345][lane]);
+        const double t626 = y2 * work[346][lane];
+        const double t627 = z2 * work[347][lane];
+        work[429][lane] = coef[22][lane] * y5 + coef[23][lane] * y3;
+        const double t629 = y4 * work[429][lane];
+        const double t630 = coef[0][lane] + z4 * (coef[22][lane] * z5 + coef[23][lane] * z3);
+        work[384][lane] = t626 + (t627 + (t629 + t630));
+        const double t632 = work[348][lane] + (coef[26][lane] * y3 + work[27][lane]);
+        work[383][lane] = x2 * t632 + (work[349][lane] + work[350][lane]);
+        work[385][lane] = y2 * t624 + (work[351][lane] + work[352][lane]);
+        const double t635 = work[353][lane] + (work[20][lane] + coef[26][lane] * x3);
+        work[387][lane] = y2 * t635 + (work[354][lane] + work[355][lane]);
+        const double t637 = x2 * work[356][lane];
+        work[426][lane] = coef[23][lane] * x3 + coef[22][lane] * x5;
+        const double t639 = x4 * work[426][lane];
+        work[386][lane] = t637 + (t627 + (t639 + t630));
+        work[388][lane] = t637 + (t626 + (t639 + (coef[0][lane] + t629)));
+        work[390][lane] = z2 * t635 + (work[357][lane] + work[358][lane]);
+        work[389][lane] = z2 * t632 + (work[359][lane] + work[360][lane]);
+        const double t644 = work[343][lane] + work[128][lane];
+        work[391][lane] = x4 * work[361][lane] + x2 * t644;
+        const double t646 = y2 * work[279][lane];
+        const double t647 = z2 * work[275][lane];
+        const double t648 = z4 * (work[343][lane] + work[362][lane]);
+        const double t649 = y4 * (work[348][lane] + work[363][lane]);
+        work[393][lane] = t646 + (t647 + (t648 + t649));
+        const double t651 = work[129][lane] + work[348][lane];
+        work[392][lane] = x4 * work[364][lane] + x2 * t651;
+        work[394][lane] = y4 * work[361][lane] + y2 * t644;
+        const double t654 = work[134][lane] + work[353][lane];
+        work[396][lane] = y4 * work[365][lane] + y2 * t654;
+        const double t656 = x2 * t578;
+        const double t657 = x4 * (work[366][lane] + work[353][lane]);
+        work[395][lane] = t656 + (t647 + (t648 + t657));
+        work[397][lane] = t656 + (t646 + (t657 + t649));
+        work[399][lane] = z2 * t654 + z4 * work[365][lane];
+        work[398][lane] = z2 * t651 + z4 * work[364][lane];
+        work[407][lane] = 0.5 * x3;
+        work[371][lane] = work[407][lane] + (2.0 * (work[367][lane] * work[404][lane]) - (work[368][lane] + work[369][lane]) * work[330][lane]);
+        work[402][lane] = x3 * work[333][lane];
+        work[372][lane] = (t601 + work[402][lane]) * work[330][lane] + 2.0 * (work[367][lane] * work[406][lane]);
+        work[373][lane] = (work[335][lane] - work[370][lane]) * work[330][lane] + 2.0 * (work[367][lane] * work[409][lane]) - t605;
+        jacobian[57][lane] = work[267][lane] * work[268][lane] + (work[269][lane] * work[270][lane] + work[271][lane] * work[272][lane]);
+        increment_jacobian[57][lane] = y2 * work[271][lane] - z2 * work[269][lane];
+        increment_jacobian[72][lane] = z2 * work[267][lane] - x2 * work[271][lane];
+        increment_jacobian[213][lane] = x5 * work[466][lane] - y5 * work[267][lane];
+        increment_jacobian[73][lane] = z2 * work[466][lane] - x2 * work[470][lane];
+        increment_jacobian[215][lane] = x5 * work[470][lane] - y5 * work[271][lane];
+        jacobian[58][lane] = work[466][lane] * work[268][lane] + (work[470][lane] * work[272][lane] + work[468][lane] * work[270][lane]);
+        increment_jacobian[58][lane] = y2 * work[470][lane] - z2 * work[468][lane];
+        increment_jacobian[88][lane] = x2 * work[468][lane] - y2 * work[466][lane];
+        increment_jacobian[214][lane] = x5 * work[468][lane] - y5 * work[269][lane];
+        increment_jacobian[183][lane] = y5 * work[465][lane] - z5 * work[466][lane];
+        increment_jacobian[198][lane] = z5 * work[267][lane] - x5 * work[465][lane];
+        increment_jacobian[89][lane] = x2 * work[467][lane] - y2 * work[465][lane];
+        increment_jacobian[184][lane] = y5 * work[467][lane] - z5 * work[468][lane];
+        increment_jacobian[199][lane] = z5 * work[269][lane] - x5 * work[467][lane];
+        jacobian[59][lane] = work[465][lane] * work[268][lane] + (work[467][lane] * work[270][lane] + work[469][lane] * work[272][lane]);
+        increment_jacobian[59][lane] = y2 * work[469][lane] - z2 * work[467][lane];
+        increment_jacobian[74][lane] = z2 * work[465][lane] - x2 * work[469][lane];
+        increment_jacobian[185][lane] = y5 * work[469][lane] - z5 * work[470][lane];
+        increment_jacobian[200][lane] = z5 * work[271][lane] - x5 * work[469][lane];
+        jacobian[60][lane] = work[188][lane] * t587 + (work[191][lane] * t589 + work[194][lane] * t591);
+        jacobian[61][lane] = work[187][lane] * t587 + (work[190][lane] * t589 + work[193][lane] * t591);
+        jacobian[62][lane] = work[186][lane] * t587 + (work[189][lane] * t589 + work[192][lane] * t591);
+        jacobian[63][lane] = work[291][lane] + work[292][lane] + (work[293][lane] * t587 + (work[294][lane] * t589 + work[295][lane] * t591));
+        jacobian[64][lane] = 1.0 + (work[294][lane] * t587 + (work[296][lane] * t589 + work[297][lane] * t591) - (work[298][lane] + work[230][lane]) * work[223][lane]);
+        jacobian[66][lane] = work[299][lane] * t587 + (work[300][lane] * t589 + work[301][lane] * t591);
+        jacobian[67][lane] = work[302][lane] * t587 + (work[303][lane] * t589 + work[304][lane] * t591);
+        jacobian[68][lane] = work[305][lane] * t587 + (work[306][lane] * t589 + work[307][lane] * t591);
+        jacobian[69][lane] = work[308][lane] * t587 + (work[309][lane] * t589 + work[310][lane] * t591);
+        jacobian[70][lane] = work[311][lane] * t587 + (work[312][lane] * t589 + work[313][lane] * t591);
+        jacobian[71][lane] = work[314][lane] * t587 + (work[315][lane] * t589 + work[316][lane] * t591);
+        jacobian[72][lane] = work[267][lane] * t587 + (work[269][lane] * t589 + work[271][lane] * t591);
+        jacobian[73][lane] = work[466][lane] * t587 + (work[468][lane] * t589 + work[470][lane] * t591);
+        jacobian[74][lane] = work[465][lane] * t587 + (work[467][lane] * t589 + work[469][lane] * t591);
+        jacobian[65][lane] = t592 - t593 + (work[295][lane] * t587 + (work[297][lane] * t589 + work[317][lane] * t591));
+        jacobian[75][lane] = work[188][lane] * t594 + (work[194][lane] * t595 + work[191][lane] * t596);
+        jacobian[76][lane] = work[187][lane] * t594 + (work[193][lane] * t595 + work[190][lane] * t596);
+        jacobian[77][lane] = work[186][lane] * t594 + (work[192][lane] * t595 + work[189][lane] * t596);
+        jacobian[78][lane] = work[323][lane] - work[324][lane] + (work[293][lane] * t594 + (work[295][lane] * t595 + work[294][lane] * t596));
+        jacobian[79][lane] = t593 + t592 + (work[294][lane] * t594 + (work[297][lane] * t595 + work[296][lane] * t596));
+        jacobian[80][lane] = 1.0 + (work[295][lane] * t594 + (work[317][lane] * t595 + work[297][lane] * t596) - work[325][lane] * work[223][lane]);
+        jacobian[81][lane] = work[299][lane] * t594 + (work[301][lane] * t595 + work[300][lane] * t596);
+        jacobian[82][lane] = work[302][lane] * t594 + (work[304][lane] * t595 + work[303][lane] * t596);
+        jacobian[83][lane] = work[305][lane] * t594 + (work[307][lane] * t595 + work[306][lane] * t596);
+        jacobian[84][lane] = work[308][lane] * t594 + (work[310][lane] * t595 + work[309][lane] * t596);
+        jacobian[85][lane] = work[311][lane] * t594 + (work[313][lane] * t595 + work[312][lane] * t596);
+        jacobian[86][lane] = work[314][lane] * t594 + (work[316][lane] * t595 + work[315][lane] * t596);
+        jacobian[87][lane] = work[267][lane] * t594 + (work[271][lane] * t595 + work[269][lane] * t596);
+        jacobian[88][lane] = work[466][lane] * t594 + (work[470][lane] * t595 + work[468][lane] * t596);
+        jacobian[89][lane] = work[465][lane] * t594 + (work[469][lane] * t595 + work[467][lane] * t596);
+        jacobian[90][lane] = work[203][lane] * t600 + (work[197][lane] * t604 + work[200][lane] * t607);
+        jacobian[91][lane] = work[202][lane] * t600 + (work[196][lane] * t604 + work[199][lane] * t607);
+        jacobian[92][lane] = work[201][lane] * t600 + (work[195][lane] * t604 + work[198][lane] * t607);
+        jacobian[93][lane] = work[305][lane] * t600 + (work[299][lane] * t604 + work[302][lane] * t607);
+        jacobian[94][lane] = work[306][lane] * t600 + (work[300][lane] * t604 + work[303][lane] * t607);
+        jacobian[95][lane] = work[307][lane] * t600 + (work[301][lane] * t604 + work[304][lane] * t607);
+        increment_jacobian[111][lane] = z3 * work[378][lane] - x3 * work[376][lane] - work[327][lane];
+        jacobian[96][lane] = 1.0 + (work[376][lane] * t600 + (work[378][lane] * t604 + work[377][lane] * t607) - (work[339][lane] + work[340][lane]) * work[330][lane]);
+        increment_jacobian[126][lane] = x3 * work[377][lane] - y3 * work[378][lane] + work[332][lane];
+        jacobian[97][lane] = work[375][lane] - work[374][lane] + (work[379][lane] * t600 + (work[377][lane] * t604 + work[380][lane] * t607));
+        increment_jacobian[97][lane] = y3 * work[379][lane] - z3 * work[380][lane] + work[327][lane];
+        increment_jacobian[127][lane] = x3 * work[380][lane] - y3 * work[377][lane] - work[333][lane];
+        jacobian[98][lane] = work[412][lane] + work[411][lane] + (work[400][lane] * t600 + (work[376][lane] * t604 + work[379][lane] * t607));
+        increment_jacobian[98][lane] = y3 * work[400][lane] - z3 * work[379][lane] - work[332][lane];
+        increment_jacobian[113][lane] = z3 * work[376][lane] - x3 * work[400][lane] + work[333][lane];
+        increment_jacobian[114][lane] = z3 * work[384][lane] - x3 * work[382][lane];
+        jacobian[99][lane] = work[382][lane] * t600 + (work[384][lane] * t604 + work[383][lane] * t607);
+        increment_jacobian[99][lane] = y3 * work[382][lane] - z3 * work[383][lane];
+        increment_jacobian[129][lane] = x3 * work[383][lane] - y3 * work[384][lane];
+        increment_jacobian[173][lane] = x4 * work[385][lane] - y4 * work[382][lane];
+        increment_jacobian[115][lane] = z3 * work[387][lane] - x3 * work[385][lane];
+        increment_jacobian[171][lane] = x4 * work[387][lane] - y4 * work[384][lane];
+        jacobian[100][lane] = work[385][lane] * t600 + (work[387][lane] * t604 + work[386][lane] * t607);
+        increment_jacobian[100][lane] = y3 * work[385][lane] - z3 * work[386][lane];
+        increment_jacobian[130][lane] = x3 * work[386][lane] - y3 * work[387][lane];
+        increment_jacobian[172][lane] = x4 * work[386][lane] - y4 * work[383][lane];
+        increment_jacobian[143][lane] = y4 * work[388][lane] - z4 * work[385][lane];
+        increment_jacobian[158][lane] = z4 * work[382][lane] - x4 * work[388][lane];
+        increment_jacobian[116][lane] = z3 * work[390][lane] - x3 * work[388][lane];
+        increment_jacobian[141][lane] = y4 * work[390][lane] - z4 * work[387][lane];
+        increment_jacobian[156][lane] = z4 * work[384][lane] - x4 * work[390][lane];
+        jacobian[101][lane] = work[388][lane] * t600 + (work[390][lane] * t604 + work[389][lane] * t607);
+        increment_jacobian[101][lane] = y3 * work[388][lane] - z3 * work[389][lane];
+        increment_jacobian[131][lane] = x3 * work[389][lane] - y3 * work[390][lane];
+        increment_jacobian[142][lane] = y4 * work[389][lane] - z4 * work[386][lane];
+        increment_jacobian[157][lane] = z4 * work[383][lane] - x4 * work[389][lane];
+        increment_jacobian[117][lane] = z3 * work[393][lane] - x3 * work[391][lane];
+        jacobian[102][lane] = work[391][lane] * t600 + (work[393][lane] * t604 + work[392][lane] * t607);
+        increment_jacobian[102][lane] = y3 * work[391][lane] - z3 * work[392][lane];
+        increment_jacobian[132][lane] = x3 * work[392][lane] - y3 * work[393][lane];
+        increment_jacobian[218][lane] = x5 * work[394][lane] - y5 * work[391][lane];
+        increment_jacobian[118][lane] = z3 * work[396][lane] - x3 * work[394][lane];
+        increment_jacobian[216][lane] = x5 * work[396][lane] - y5 * work[393][lane];
+        jacobian[103][lane] = work[394][lane] * t600 + (work[396][lane] * t604 + work[395][lane] * t607);
+        increment_jacobian[103][lane] = y3 * work[394][lane] - z3 * work[395][lane];
+        increment_jacobian[133][lane] = x3 * work[395][lane] - y3 * work[396][lane];
+        increment_jacobian[217][lane] = x5 * work[395][lane] - y5 * work[392][lane];
+        increment_jacobian[188][lane] = y5 * work[397][lane] - z5 * work[394][lane];
+        increment_jacobian[203][lane] = z5 * work[391][lane] - x5 * work[397][lane];
+        increment_jacobian[119][lane] = z3 * work[399][lane] - x3 * work[397][lane];
+        increment_jacobian[186][lane] = y5 * work[399][lane] - z5 * work[396][lane];
+        increment_jacobian[201][lane] = z5 * work[393][lane] - x5 * work[399][lane];
+        jacobian[104][lane] = work[397][lane] * t600 + (work[399][lane] * t604 + work[398][lane] * t607);
+        increment_jacobian[104][lane] = y3 * work[397][lane] - z3 * work[398][lane];
+        increment_jacobian[134][lane] = x3 * work[398][lane] - y3 * work[399][lane];
+        increment_jacobian[187][lane] = y5 * work[398][lane] - z5 * work[395][lane];
+        increment_jacobian[202][lane] = z5 * work[392][lane] - x5 * work[398][lane];
+        jacobian[105][lane] = work[203][lane] * work[371][lane] + (work[200][lane] * work[372][lane] + work[197][lane] * work[373][lane]);
+        jacobian[106][lane] = work[202][lane] * work[371][lane] + (work[199][lane] * work[372][lane] + work[196][lane] * work[373][lane]);
+        jacobian[107][lane] = work[201][lane] * work[371][lane] + (work[198][lane] * work[372][lane] + work[195][lane] * work[373][lane]);
+        jacobian[108][lane] = work[305][lane] * work[371][lane] + (work[302][lane] * work[372][lane] + work[299][lane] * work[373][lane]);
+    }
+}
+
+/* spin_chain5_linearise_lanes_part6 (part 6 of 7) */
+spin_chain5_APART static void spin_chain5_linearise_lanes_part6(spin_chain5_lanes coef[restrict 33],
+                                                                spin_chain5_lanes y[restrict 15],
+                                                                spin_chain5_lanes displacement[restrict 15],
+                                                                spin_chain5_lanes increment[restrict 15],
+                                                                spin_chain5_lanes jacobian[restrict 225],
+                                                                spin_chain5_lanes increment_jacobian[restrict 225],
+                                                                spin_chain5_lanes work[restrict 517])
+{
+    (void)displacement;
+    (void)increment;
+    spin_chain5_EACH_LANE
+    for (int lane = 0; lane < spin_chain5_LANES; ++lane) {
+        const double x1 = y[0][lane];
+        const double y1_ = y[1][lane];
+        const double z1 = y[2][lane];
+        const double x3 = y[6][lane];
+        const double y3 = y[7][lane];
+        const double z3 = y[8][lane];
+        const double x4 = y[9][lane];
+        const double y4 = y[10][lane];
+        const double z4 = y[11][lane];
+        const double x5 = y[12][lane];
+        const double y5 = y[13][lane];
+        const double z5 = y[14][lane];
+        const double t667 = work[327][lane] * work[332][lane] * work[330][lane];
+        const double t668 = 0.5 * work[333][lane];
+        const double t669 = (work[401][lane] + work[402][lane]) * work[330][lane] + 2.0 * (work[403][lane] * work[404][lane]);
+        const double t670 = (work[369][lane] - work[405][lane]) * work[330][lane] + 2.0 * (work[403][lane] * work[406][lane]) - work[407][lane];
+        const double t671 = work[408][lane] + (2.0 * (work[403][lane] * work[409][lane]) - (work[410][lane] + work[328][lane]) * work[330][lane]);
+        const double t672 = y4 * work[414][lane];
+        const double t673 = z4 * work[415][lane];
+        const double t674 = spin_chain5_phi1_lane(work[416][lane]);
+        const double t675 = work[417][lane] * t674;
+        const double t676 = (t672 + t673) * work[418][lane] + 2.0 * (work[419][lane] * t675);
+        const double t677 = work[415][lane] * t674;
+        const double t678 = 0.5 * y4;
+        const double t679 = (work[420][lane] - work[421][lane]) * work[418][lane] + 2.0 * (work[419][lane] * t677) - t678;
+        const double t680 = 0.5 * z4;
+        const double t681 = work[414][lane] * t674;
+        const double t682 = t680 + (2.0 * (work[419][lane] * t681) - (work[422][lane] + work[423][lane]) * work[418][lane]);
+        const double t683 = y3 * work[424][lane];
+        const double t684 = z3 * work[425][lane];
+        const double t685 = y5 * (coef[29][lane] * y5);
+        const double t686 = coef[28][lane] + z5 * (coef[29][lane] * z5);
+        const double t687 = t683 + (t684 + (t685 + t686));
+        const double t688 = coef[27][lane] * x5 + coef[22][lane] * x3;
+        work[514][lane] = z3 * work[426][lane] + z5 * t688;
+        work[515][lane] = y5 * t688 + y3 * work[426][lane];
+        const double t691 = work[414][lane] * work[417][lane] * work[418][lane];
+        const double t692 = 0.5 * work[415][lane];
+        work[516][lane] = z3 * work[429][lane] + z5 * (coef[22][lane] * y3 + coef[27][lane] * y5);
+        const double t694 = x3 * work[430][lane];
+        const double t695 = x5 * (coef[29][lane] * x5);
+        const double t696 = t694 + (t684 + (t695 + t686));
+        const double t697 = 0.5 * work[414][lane];
+        const double t698 = work[415][lane] * work[417][lane] * work[418][lane];
+        const double t699 = t694 + (t683 + (t695 + (coef[28][lane] + t685)));
+        const double t700 = y3 * work[364][lane];
+        const double t701 = z3 * work[361][lane];
+        const double t702 = coef[1][lane] * y1_ + coef[27][lane] * y4;
+        const double t703 = y5 * t702;
+        const double t704 = coef[0][lane] + z5 * (coef[1][lane] * z1 + coef[27][lane] * z4);
+        work[499][lane] = t700 + (t701 + (t703 + t704));
+        const double t706 = work[63][lane] + (work[343][lane] + coef[30][lane] * z4);
+        const double t707 = coef[29][lane] * z4;
+        const double t708 = coef[2][lane] * z1 + t707;
+        work[505][lane] = x3 * t706 + (x5 * t708 + work[431][lane]);
+        const double t710 = work[432][lane] + (coef[30][lane] * y4 + work[348][lane]);
+        const double t711 = coef[29][lane] * y4;
+        const double t712 = t711 + coef[2][lane] * y1_;
+        work[502][lane] = x3 * t710 + (x5 * t712 + work[433][lane]);
+        const double t714 = work[434][lane] + (work[353][lane] + coef[30][lane] * x4);
+        work[475][lane] = coef[29][lane] * x4;
+        const double t716 = coef[2][lane] * x1 + work[475][lane];
+        work[498][lane] = y3 * t714 + (y5 * t716 + work[435][lane]);
+        const double t718 = x3 * work[365][lane];
+        const double t719 = coef[27][lane] * x4 + coef[1][lane] * x1;
+        const double t720 = x5 * t719;
+        work[501][lane] = t718 + (t701 + (t720 + t704));
+        work[504][lane] = y3 * t706 + (y5 * t708 + work[436][lane]);
+        work[497][lane] = z3 * t714 + (z5 * t716 + work[437][lane]);
+        work[500][lane] = z3 * t710 + (z5 * t712 + work[438][lane]);
+        work[503][lane] = t718 + (t700 + (t720 + (coef[0][lane] + t703)));
+        const double t726 = (work[423][lane] - work[439][lane]) * work[418][lane] + 2.0 * (work[440][lane] * t675) - t680;
+        const double t727 = x4 * work[417][lane];
+        const double t728 = (t727 + t673) * work[418][lane] + 2.0 * (work[440][lane] * t681);
+        const double t729 = 0.5 * x4;
+        const double t730 = t729 + (2.0 * (work[440][lane] * t677) - (work[441][lane] + work[442][lane]) * work[418][lane]);
+        const double t731 = work[414][lane] * work[415][lane] * work[418][lane];
+        const double t732 = 0.5 * work[417][lane];
+        const double t733 = t678 + (2.0 * (work[444][lane] * t675) - (work[445][lane] + work[420][lane]) * work[418][lane]);
+        const double t734 = (t727 + t672) * work[418][lane] + 2.0 * (work[444][lane] * t677);
+        const double t735 = (work[442][lane] - work[446][lane]) * work[418][lane] + 2.0 * (work[444][lane] * t681) - t729;
+        const double t736 = spin_chain5_phi1_lane(work[448][lane]);
+        work[489][lane] = work[97][lane] * t736;
+        work[510][lane] = 0.5 * y5;
+        work[481][lane] = (work[449][lane] - work[450][lane]) * work[451][lane] + 2.0 * (work[452][lane] * work[489][lane]) - work[510][lane];
+        work[508][lane] = y5 * work[453][lane];
+        work[492][lane] = z5 * work[97][lane];
+        work[495][lane] = work[454][lane] * t736;
+        work[483][lane] = (work[508][lane] + work[492][lane]) * work[451][lane] + 2.0 * (work[452][lane] * work[495][lane]);
+        work[496][lane] = 0.5 * z5;
+        work[493][lane] = work[453][lane] * t736;
+        work[484][lane] = work[496][lane] + (2.0 * (work[452][lane] * work[493][lane]) - (work[455][lane] + work[456][lane]) * work[451][lane]);
+        work[487][lane] = z1 * work[471][lane] + z4 * t719;
+        work[485][lane] = y1_ * work[78][lane];
+        work[476][lane] = z1 * work[472][lane];
+        work[486][lane] = y4 * t711;
+        work[477][lane] = coef[31][lane] + z4 * t707;
+        work[506][lane] = work[485][lane] + (work[476][lane] + (work[486][lane] + work[477][lane]));
+        work[482][lane] = y4 * t719 + y1_ * work[471][lane];
+        work[478][lane] = work[454][lane] * work[453][lane] * work[451][lane];
+        work[479][lane] = 0.5 * work[97][lane];
+        work[480][lane] = z1 * work[474][lane] + z4 * t702;
+        jacobian[109][lane] = work[306][lane] * work[371][lane] + (work[303][lane] * work[372][lane] + work[300][lane] * work[373][lane]);
+        jacobian[110][lane] = work[307][lane] * work[371][lane] + (work[304][lane] * work[372][lane] + work[301][lane] * work[373][lane]);
+        jacobian[111][lane] = work[374][lane] + work[375][lane] + (work[376][lane] * work[371][lane] + (work[377][lane] * work[372][lane] + work[378][lane] * work[373][lane]));
+        jacobian[112][lane] = 1.0 + (work[379][lane] * work[371][lane] + (work[380][lane] * work[372][lane] + work[377][lane] * work[373][lane]) - (work[381][lane] + work[339][lane]) * work[330][lane]);
+        jacobian[114][lane] = work[382][lane] * work[371][lane] + (work[383][lane] * work[372][lane] + work[384][lane] * work[373][lane]);
+        jacobian[115][lane] = work[385][lane] * work[371][lane] + (work[386][lane] * work[372][lane] + work[387][lane] * work[373][lane]);
+        jacobian[116][lane] = work[388][lane] * work[371][lane] + (work[389][lane] * work[372][lane] + work[390][lane] * work[373][lane]);
+        jacobian[117][lane] = work[391][lane] * work[371][lane] + (work[392][lane] * work[372][lane] + work[393][lane] * work[373][lane]);
+        jacobian[118][lane] = work[394][lane] * work[371][lane] + (work[395][lane] * work[372][lane] + work[396][lane] * work[373][lane]);
+        jacobian[119][lane] = work[397][lane] * work[371][lane] + (work[398][lane] * work[372][lane] + work[399][lane] * work[373][lane]);
+        jacobian[113][lane] = t667 - t668 + (work[400][lane] * work[371][lane] + (work[379][lane] * work[372][lane] + work[376][lane] * work[373][lane]));
+        jacobian[120][lane] = work[203][lane] * t669 + (work[200][lane] * t670 + work[197][lane] * t671);
+        jacobian[121][lane] = work[202][lane] * t669 + (work[199][lane] * t670 + work[196][lane] * t671);
+        jacobian[122][lane] = work[201][lane] * t669 + (work[198][lane] * t670 + work[195][lane] * t671);
+        jacobian[123][lane] = work[305][lane] * t669 + (work[299][lane] * t671 + work[302][lane] * t670);
+        jacobian[124][lane] = work[306][lane] * t669 + (work[303][lane] * t670 + work[300][lane] * t671);
+        jacobian[125][lane] = work[307][lane] * t669 + (work[301][lane] * t671 + work[304][lane] * t670);
+        jacobian[126][lane] = work[411][lane] - work[412][lane] + (work[376][lane] * t669 + (work[378][lane] * t671 + work[377][lane] * t670));
+        jacobian[127][lane] = t668 + t667 + (work[379][lane] * t669 + (work[377][lane] * t671 + work[380][lane] * t670));
+        jacobian[128][lane] = 1.0 + (work[400][lane] * t669 + (work[376][lane] * t671 + work[379][lane] * t670) - work[413][lane] * work[330][lane]);
+        jacobian[129][lane] = work[382][lane] * t669 + (work[384][lane] * t671 + work[383][lane] * t670);
+        jacobian[130][lane] = work[385][lane] * t669 + (work[387][lane] * t671 + work[386][lane] * t670);
+        jacobian[131][lane] = work[388][lane] * t669 + (work[389][lane] * t670 + work[390][lane] * t671);
+        jacobian[132][lane] = work[391][lane] * t669 + (work[392][lane] * t670 + work[393][lane] * t671);
+        jacobian[133][lane] = work[394][lane] * t669 + (work[395][lane] * t670 + work[396][lane] * t671);
+        jacobian[134][lane] = work[397][lane] * t669 + (work[398][lane] * t670 + work[399][lane] * t671);
+        jacobian[135][lane] = work[206][lane] * t676 + (work[212][lane] * t679 + work[209][lane] * t682);
+        jacobian[136][lane] = work[205][lane] * t676 + (work[211][lane] * t679 + work[208][lane] * t682);
+        jacobian[137][lane] = work[204][lane] * t676 + (work[210][lane] * t679 + work[207][lane] * t682);
+        jacobian[138][lane] = work[308][lane] * t676 + (work[311][lane] * t682 + work[314][lane] * t679);
+        jacobian[139][lane] = work[309][lane] * t676 + (work[315][lane] * t679 + work[312][lane] * t682);
+        jacobian[140][lane] = work[310][lane] * t676 + (work[313][lane] * t682 + work[316][lane] * t679);
+        jacobian[141][lane] = work[384][lane] * t676 + (work[387][lane] * t682 + work[390][lane] * t679);
+        jacobian[142][lane] = work[383][lane] * t676 + (work[389][lane] * t679 + work[386][lane] * t682);
+        jacobian[143][lane] = work[382][lane] * t676 + (work[385][lane] * t682 + work[388][lane] * t679);
+        increment_jacobian[159][lane] = z4 * t687 - x4 * work[514][lane] - work[415][lane];
+        jacobian[144][lane] = 1.0 + (t687 * t676 + (work[514][lane] * t679 + work[515][lane] * t682) - (work[427][lane] + work[428][lane]) * work[418][lane]);
+        increment_jacobian[174][lane] = x4 * work[515][lane] - y4 * t687 + work[414][lane];
+        jacobian[145][lane] = t691 - t692 + (work[515][lane] * t676 + (work[516][lane] * t679 + t696 * t682));
+        increment_jacobian[145][lane] = y4 * work[516][lane] - z4 * t696 + work[415][lane];
+        increment_jacobian[175][lane] = x4 * t696 - y4 * work[515][lane] - work[417][lane];
+        jacobian[146][lane] = t697 + t698 + (work[514][lane] * t676 + (t699 * t679 + work[516][lane] * t682));
+        increment_jacobian[146][lane] = y4 * t699 - z4 * work[516][lane] - work[414][lane];
+        increment_jacobian[161][lane] = z4 * work[514][lane] - x4 * t699 + work[417][lane];
+        increment_jacobian[162][lane] = z4 * work[499][lane] - x4 * work[505][lane];
+        jacobian[147][lane] = work[499][lane] * t676 + (work[505][lane] * t679 + work[502][lane] * t682);
+        increment_jacobian[147][lane] = y4 * work[505][lane] - z4 * work[502][lane];
+        increment_jacobian[177][lane] = x4 * work[502][lane] - y4 * work[499][lane];
+        increment_jacobian[219][lane] = x5 * work[498][lane] - y5 * work[499][lane];
+        increment_jacobian[178][lane] = x4 * work[501][lane] - y4 * work[498][lane];
+        increment_jacobian[220][lane] = x5 * work[501][lane] - y5 * work[502][lane];
+        jacobian[148][lane] = work[498][lane] * t676 + (work[501][lane] * t682 + work[504][lane] * t679);
+        increment_jacobian[148][lane] = y4 * work[504][lane] - z4 * work[501][lane];
+        increment_jacobian[163][lane] = z4 * work[498][lane] - x4 * work[504][lane];
+        increment_jacobian[221][lane] = x5 * work[504][lane] - y5 * work[505][lane];
+        increment_jacobian[189][lane] = y5 * work[497][lane] - z5 * work[498][lane];
+        increment_jacobian[204][lane] = z5 * work[499][lane] - x5 * work[497][lane];
+        increment_jacobian[179][lane] = x4 * work[500][lane] - y4 * work[497][lane];
+        increment_jacobian[190][lane] = y5 * work[500][lane] - z5 * work[501][lane];
+        increment_jacobian[205][lane] = z5 * work[502][lane] - x5 * work[500][lane];
+        jacobian[149][lane] = work[497][lane] * t676 + (work[500][lane] * t682 + work[503][lane] * t679);
+        increment_jacobian[149][lane] = y4 * work[503][lane] - z4 * work[500][lane];
+        increment_jacobian[164][lane] = z4 * work[497][lane] - x4 * work[503][lane];
+        increment_jacobian[191][lane] = y5 * work[503][lane] - z5 * work[504][lane];
+        increment_jacobian[206][lane] = z5 * work[505][lane] - x5 * work[503][lane];
+        jacobian[150][lane] = work[206][lane] * t726 + (work[209][lane] * t728 + work[212][lane] * t730);
+        jacobian[151][lane] = work[205][lane] * t726 + (work[208][lane] * t728 + work[211][lane] * t730);
+        jacobian[152][lane] = work[204][lane] * t726 + (work[207][lane] * t728 + work[210][lane] * t730);
+        jacobian[153][lane] = work[308][lane] * t726 + (work[311][lane] * t728 + work[314][lane] * t730);
+        jacobian[154][lane] = work[309][lane] * t726 + (work[312][lane] * t728 + work[315][lane] * t730);
+        jacobian[155][lane] = work[310][lane] * t726 + (work[313][lane] * t728 + work[316][lane] * t730);
+        jacobian[156][lane] = work[384][lane] * t726 + (work[387][lane] * t728 + work[390][lane] * t730);
+        jacobian[157][lane] = work[383][lane] * t726 + (work[386][lane] * t728 + work[389][lane] * t730);
+        jacobian[158][lane] = work[382][lane] * t726 + (work[385][lane] * t728 + work[388][lane] * t730);
+        jacobian[159][lane] = t692 + t691 + (t687 * t726 + (work[515][lane] * t728 + work[514][lane] * t730));
+        jacobian[160][lane] = 1.0 + (work[515][lane] * t726 + (t696 * t728 + work[516][lane] * t730) - (work[427][lane] + work[443][lane]) * work[418][lane]);
+        jacobian[162][lane] = work[499][lane] * t726 + (work[502][lane] * t728 + work[505][lane] * t730);
+        jacobian[163][lane] = work[498][lane] * t726 + (work[501][lane] * t728 + work[504][lane] * t730);
+        jacobian[164][lane] = work[497][lane] * t726 + (work[500][lane] * t728 + work[503][lane] * t730);
+        jacobian[161][lane] = t731 - t732 + (work[514][lane] * t726 + (work[516][lane] * t728 + t699 * t730));
+        jacobian[165][lane] = work[206][lane] * t733 + (work[212][lane] * t734 + work[209][lane] * t735);
+        jacobian[166][lane] = work[205][lane] * t733 + (work[211][lane] * t734 + work[208][lane] * t735);
+        jacobian[167][lane] = work[204][lane] * t733 + (work[210][lane] * t734 + work[207][lane] * t735);
+        jacobian[168][lane] = work[308][lane] * t733 + (work[314][lane] * t734 + work[311][lane] * t735);
+        jacobian[169][lane] = work[309][lane] * t733 + (work[315][lane] * t734 + work[312][lane] * t735);
+        jacobian[170][lane] = work[310][lane] * t733 + (work[316][lane] * t734 + work[313][lane] * t735);
+        jacobian[171][lane] = work[384][lane] * t733 + (work[390][lane] * t734 + work[387][lane] * t735);
+        jacobian[172][lane] = work[383][lane] * t733 + (work[389][lane] * t734 + work[386][lane] * t735);
+        jacobian[173][lane] = work[382][lane] * t733 + (work[388][lane] * t734 + work[385][lane] * t735);
+        jacobian[174][lane] = t698 - t697 + (t687 * t733 + (work[514][lane] * t734 + work[515][lane] * t735));
+        jacobian[175][lane] = t732 + t731 + (work[515][lane] * t733 + (work[516][lane] * t734 + t696 * t735));
+        jacobian[176][lane] = 1.0 + (work[514][lane] * t733 + (t699 * t734 + work[516][lane] * t735) - work[447][lane] * work[418][lane]);
+        jacobian[177][lane] = work[499][lane] * t733 + (work[505][lane] * t734 + work[502][lane] * t735);
+        jacobian[178][lane] = work[498][lane] * t733 + (work[504][lane] * t734 + work[501][lane] * t735);
+        jacobian[179][lane] = work[497][lane] * t733 + (work[503][lane] * t734 + work[500][lane] * t735);
+        jacobian[180][lane] = work[457][lane] * work[481][lane] + (work[458][lane] * work[483][lane] + work[459][lane] * work[484][lane]);
+        jacobian[181][lane] = work[460][lane] * work[481][lane] + (work[461][lane] * work[483][lane] + work[462][lane] * work[484][lane]);
+        jacobian[182][lane] = work[463][lane] * work[481][lane] + (work[153][lane] * work[483][lane] + work[464][lane] * work[484][lane]);
+        jacobian[183][lane] = work[465][lane] * work[481][lane] + (work[267][lane] * work[483][lane] + work[466][lane] * work[484][lane]);
+        jacobian[184][lane] = work[467][lane] * work[481][lane] + (work[269][lane] * work[483][lane] + work[468][lane] * work[484][lane]);
+        jacobian[185][lane] = work[469][lane] * work[481][lane] + (work[271][lane] * work[483][lane] + work[470][lane] * work[484][lane]);
+        jacobian[186][lane] = work[399][lane] * work[481][lane] + (work[393][lane] * work[483][lane] + work[396][lane] * work[484][lane]);
+        jacobian[187][lane] = work[398][lane] * work[481][lane] + (work[392][lane] * work[483][lane] + work[395][lane] * work[484][lane]);
+        jacobian[188][lane] = work[397][lane] * work[481][lane] + (work[391][lane] * work[483][lane] + work[394][lane] * work[484][lane]);
+        jacobian[189][lane] = work[497][lane] * work[481][lane] + (work[499][lane] * work[483][lane] + work[498][lane] * work[484][lane]);
+        jacobian[190][lane] = work[500][lane] * work[481][lane] + (work[502][lane] * work[483][lane] + work[501][lane] * work[484][lane]);
+        jacobian[191][lane] = work[503][lane] * work[481][lane] + (work[505][lane] * work[483][lane] + work[504][lane] * work[484][lane]);
+        increment_jacobian[207][lane] = z5 * work[506][lane] - x5 * work[487][lane] - work[97][lane];
+        jacobian[192][lane] = 1.0 + (work[487][lane] * work[481][lane] + (work[506][lane] * work[483][lane] + work[482][lane] * work[484][lane]) - (work[96][lane] + work[473][lane]) * work[451][lane]);
+        increment_jacobian[222][lane] = x5 * work[482][lane] - y5 * work[506][lane] + work[453][lane];
+    }
+}
+
+/* spin_chain5_linearise_lanes_part7 (part 7 of 7) */
+spin_chain5_APART static void spin_chain5_linearise_lanes_part7(spin_chain5_lanes coef[restrict 33],
+                                                                spin_chain5_lanes y[restrict 15],
+                                                                spin_chain5_lanes displacement[restrict 15],
+                                                                spin_chain5_lanes increment[restrict 15],
+                                                                spin_chain5_lanes jacobian[restrict 225],
+                                                                spin_chain5_lanes increment_jacobian[restrict 225],
+                                                                spin_chain5_lanes work[restrict 517])
+{
+    (void)displacement;
+    (void)increment;
+    spin_chain5_EACH_LANE
+    for (int lane = 0; lane < spin_chain5_LANES; ++lane) {
+        const double x1 = y[0][lane];
+        const double y1_ = y[1][lane];
+        const double z1 = y[2][lane];
+        const double x2 = y[3][lane];
+        const double y2 = y[4][lane];
+        const double z2 = y[5][lane];
+        const double x3 = y[6][lane];
+        const double y3 = y[7][lane];
+        const double z3 = y[8][lane];
+        const double x4 = y[9][lane];
+        const double y4 = y[10][lane];
+        const double z4 = y[11][lane];
+        const double x5 = y[12][lane];
+        const double y5 = y[13][lane];
+        const double z5 = y[14][lane];
+        const double t757 = x1 * work[95][lane];
+        const double t758 = x4 * work[475][lane];
+        const double t759 = t757 + (work[476][lane] + (t758 + work[477][lane]));
+        const double t760 = 0.5 * work[453][lane];
+        const double t761 = work[97][lane] * work[454][lane] * work[451][lane];
+        const double t762 = t757 + (work[485][lane] + (t758 + (coef[31][lane] + work[486][lane])));
+        const double t763 = 0.5 * x5;
+        const double t764 = t763 + (2.0 * (work[488][lane] * work[489][lane]) - (work[490][lane] + work[491][lane]) * work[451][lane]);
+        const double t765 = x5 * work[454][lane];
+        const double t766 = (t765 + work[492][lane]) * work[451][lane] + 2.0 * (work[488][lane] * work[493][lane]);
+        const double t767 = (work[456][lane] - work[494][lane]) * work[451][lane] + 2.0 * (work[488][lane] * work[495][lane]) - work[496][lane];
+        const double t768 = work[97][lane] * work[453][lane] * work[451][lane];
+        const double t769 = 0.5 * work[454][lane];
+        const double t770 = (t765 + work[508][lane]) * work[451][lane] + 2.0 * (work[509][lane] * work[489][lane]);
+        const double t771 = work[510][lane] + (2.0 * (work[509][lane] * work[495][lane]) - (work[511][lane] + work[449][lane]) * work[451][lane]);
+        const double t772 = (work[491][lane] - work[512][lane]) * work[451][lane] + 2.0 * (work[509][lane] * work[493][lane]) - t763;
+        const double t773 = y1_ * work[180][lane];
+        const double t774 = z1 * work[181][lane];
+        const double t775 = x1 * work[183][lane];
+        const double t776 = y2 * work[295][lane];
+        const double t777 = z2 * work[294][lane];
+        const double t778 = x2 * work[297][lane];
+        const double t779 = y3 * work[376][lane];
+        const double t780 = z3 * work[377][lane];
+        const double t781 = x3 * work[379][lane];
+        const double t782 = y4 * work[514][lane];
+        const double t783 = z4 * work[515][lane];
+        const double t784 = x4 * work[516][lane];
+        const double t785 = y5 * work[487][lane];
+        const double t786 = z5 * work[482][lane];
+        const double t787 = x5 * work[480][lane];
+        jacobian[193][lane] = work[478][lane] - work[479][lane] + (work[480][lane] * work[481][lane] + (work[482][lane] * work[483][lane] + t759 * work[484][lane]));
+        increment_jacobian[193][lane] = y5 * work[480][lane] - z5 * t759 + work[97][lane];
+        increment_jacobian[223][lane] = x5 * t759 - y5 * work[482][lane] - work[454][lane];
+        jacobian[194][lane] = t760 + t761 + (t762 * work[481][lane] + (work[487][lane] * work[483][lane] + work[480][lane] * work[484][lane]));
+        increment_jacobian[194][lane] = y5 * t762 - z5 * work[480][lane] - work[453][lane];
+        increment_jacobian[209][lane] = z5 * work[487][lane] - x5 * t762 + work[454][lane];
+        jacobian[195][lane] = work[457][lane] * t764 + (work[459][lane] * t766 + work[458][lane] * t767);
+        jacobian[196][lane] = work[460][lane] * t764 + (work[462][lane] * t766 + work[461][lane] * t767);
+        jacobian[197][lane] = work[463][lane] * t764 + (work[464][lane] * t766 + work[153][lane] * t767);
+        jacobian[198][lane] = work[465][lane] * t764 + (work[466][lane] * t766 + work[267][lane] * t767);
+        jacobian[199][lane] = work[467][lane] * t764 + (work[468][lane] * t766 + work[269][lane] * t767);
+        jacobian[200][lane] = work[469][lane] * t764 + (work[470][lane] * t766 + work[271][lane] * t767);
+        jacobian[201][lane] = work[399][lane] * t764 + (work[396][lane] * t766 + work[393][lane] * t767);
+        jacobian[202][lane] = work[398][lane] * t764 + (work[395][lane] * t766 + work[392][lane] * t767);
+        jacobian[203][lane] = work[397][lane] * t764 + (work[394][lane] * t766 + work[391][lane] * t767);
+        jacobian[204][lane] = work[497][lane] * t764 + (work[498][lane] * t766 + work[499][lane] * t767);
+        jacobian[205][lane] = work[500][lane] * t764 + (work[501][lane] * t766 + work[502][lane] * t767);
+        jacobian[206][lane] = work[503][lane] * t764 + (work[504][lane] * t766 + work[505][lane] * t767);
+        jacobian[207][lane] = work[479][lane] + work[478][lane] + (work[487][lane] * t764 + (work[482][lane] * t766 + work[506][lane] * t767));
+        jacobian[208][lane] = 1.0 + (work[480][lane] * t764 + (t759 * t766 + work[482][lane] * t767) - (work[507][lane] + work[96][lane]) * work[451][lane]);
+        jacobian[209][lane] = t768 - t769 + (t762 * t764 + (work[480][lane] * t766 + work[487][lane] * t767));
+        jacobian[210][lane] = work[457][lane] * t770 + (work[458][lane] * t771 + work[459][lane] * t772);
+        jacobian[211][lane] = work[460][lane] * t770 + (work[462][lane] * t772 + work[461][lane] * t771);
+        jacobian[212][lane] = work[463][lane] * t770 + (work[464][lane] * t772 + work[153][lane] * t771);
+        jacobian[213][lane] = work[465][lane] * t770 + (work[267][lane] * t771 + work[466][lane] * t772);
+        jacobian[214][lane] = work[467][lane] * t770 + (work[468][lane] * t772 + work[269][lane] * t771);
+        jacobian[215][lane] = work[469][lane] * t770 + (work[470][lane] * t772 + work[271][lane] * t771);
+        jacobian[216][lane] = work[399][lane] * t770 + (work[396][lane] * t772 + work[393][lane] * t771);
+        jacobian[217][lane] = work[398][lane] * t770 + (work[395][lane] * t772 + work[392][lane] * t771);
+        jacobian[218][lane] = work[397][lane] * t770 + (work[394][lane] * t772 + work[391][lane] * t771);
+        jacobian[219][lane] = work[497][lane] * t770 + (work[499][lane] * t771 + work[498][lane] * t772);
+        jacobian[220][lane] = work[500][lane] * t770 + (work[501][lane] * t772 + work[502][lane] * t771);
+        jacobian[221][lane] = work[503][lane] * t770 + (work[504][lane] * t772 + work[505][lane] * t771);
+        jacobian[222][lane] = t761 - t760 + (work[487][lane] * t770 + (work[482][lane] * t772 + work[506][lane] * t771));
+        jacobian[223][lane] = t769 + t768 + (work[480][lane] * t770 + (work[482][lane] * t771 + t759 * t772));
+        jacobian[224][lane] = 1.0 + (t762 * t770 + (work[487][lane] * t771 + work[480][lane] * t772) - work[513][lane] * work[451][lane]);
+        increment_jacobian[0][lane] = t773 - t774;
+        increment_jacobian[16][lane] = t774 - t775;
+        increment_jacobian[32][lane] = t775 - t773;
+        increment_jacobian[48][lane] = t776 - t777;
+        increment_jacobian[64][lane] = t777 - t778;
+        increment_jacobian[80][lane] = t778 - t776;
+        increment_jacobian[96][lane] = t779 - t780;
+        increment_jacobian[112][lane] = t780 - t781;
+        increment_jacobian[128][lane] = t781 - t779;
+        increment_jacobian[144][lane] = t782 - t783;
+        increment_jacobian[160][lane] = t783 - t784;
+        increment_jacobian[176][lane] = t784 - t782;
+        increment_jacobian[192][lane] = t785 - t786;
+        increment_jacobian[208][lane] = t786 - t787;
+        increment_jacobian[224][lane] = t787 - t785;
+    }
+}
+
+/* spin_chain5_linearise in all lanes. */
+static void spin_chain5_linearise_lanes(spin_chain5_lanes coef[restrict 33], spin_chain5_lanes y[restrict 15],
+                                        spin_chain5_lanes displacement[restrict 15],
+                                        spin_chain5_lanes increment[restrict 15],
+                                        spin_chain5_lanes jacobian[restrict 225],
+                                        spin_chain5_lanes increment_jacobian[restrict 225])
+{
+    spin_chain5_lanes work[517];
+    spin_chain5_linearise_lanes_part1(coef, y, displacement, increment, jacobian, increment_jacobian, work);
+    spin_chain5_linearise_lanes_part2(coef, y, displacement, increment, jacobian, increment_jacobian, work);
+    spin_chain5_linearise_lanes_part3(coef, y, displacement, increment, jacobian, increment_jacobian, work);
+    spin_chain5_linearise_lanes_part4(coef, y, displacement, increment, jacobian, increment_jacobian, work);
+    spin_chain5_linearise_lanes_part5(coef, y, displacement, increment, jacobian, increment_jacobian, work);
+    spin_chain5_linearise_lanes_part6(coef, y, displacement, increment, jacobian, increment_jacobian, work);
+    spin_chain5_linearise_lanes_part7(coef, y, displacement, increment, jacobian, increment_jacobian, work);
+}
+
+/* Invert the matrices of all lanes in place by elimination without pivoting: they are I + O(h). Infinite where a pivot is
+   far from 1. */
+static void spin_chain5_invert(spin_chain5_lanes matrix[restrict 225])
+{
+    for (int k = 0; k < 15; ++k) {
+        spin_chain5_lanes factor[15];
+        spin_chain5_EACH_LANE
+        for (int lane = 0; lane < spin_chain5_LANES; ++lane) {
+            const double reciprocal = 1.0 / matrix[k * 15 + k][lane];
+            matrix[k * 15 + k][lane] = 1.0;
+            for (int j = 0; j < 15; ++j) matrix[k * 15 + j][lane] *= reciprocal;
+            matrix[k * 15 + k][lane] += fabs(reciprocal) < 1e3 ? 0.0 : HUGE_VAL;
+        }
+        for (int i = 0; i < 15; ++i) {
+            spin_chain5_EACH_LANE
+            for (int lane = 0; lane < spin_chain5_LANES; ++lane) {
+                factor[i][lane] = matrix[i * 15 + k][lane];
+                if (i != k) matrix[i * 15 + k][lane] = 0.0;
+            }
+        }
+        for (int i = 0; i < 15; ++i)
+            for (int j = 0; j < 15 && i != k; ++j) {
+                spin_chain5_EACH_LANE
+                for (int lane = 0; lane < spin_chain5_LANES; ++lane)
+                    matrix[i * 15 + j][lane] -= factor[i][lane] * matrix[k * 15 + j][lane];
+            }
+    }
+}
+
+/* Everything about a stage at the points y. */
+static void spin_chain5_tabulate(spin_chain5_lanes coef[restrict], spin_chain5_lines *line)
+{
+    spin_chain5_linearise_lanes(coef, line->y, line->displacement, line->increment, line->inverse, line->slope);
+    spin_chain5_invert(line->inverse);
+    for (int i = 0; i < 15; ++i)
+        for (int j = 0; j < 15; ++j) {
+            spin_chain5_lanes sum = { 0.0 };
+            for (int k = 0; k < 15; ++k) {
+                spin_chain5_EACH_LANE
+                for (int lane = 0; lane < spin_chain5_LANES; ++lane)
+                    sum[lane] += line->slope[i * 15 + k][lane] * line->inverse[k * 15 + j][lane];
+            }
+            memcpy(line->gain[i * 15 + j], sum, sizeof sum);
+        }
+}
+
+/* spin_chain5_size in all lanes, summed over the components. */
+static void spin_chain5_sizes(spin_chain5_lanes y[restrict 15], spin_chain5_lanes delta[restrict 15],
+    spin_chain5_lanes size)
+{
+    spin_chain5_lanes norm = { 0.0 };
+    memset(size, 0, spin_chain5_LANES * sizeof size[0]);
+    for (int i = 0; i < 15; ++i)
+        for (int lane = 0; lane < spin_chain5_LANES; ++lane)
+            norm[lane] = 1e-6 * fabs(y[i][lane]) > norm[lane] ? 1e-6 * fabs(y[i][lane]) : norm[lane];
+    for (int i = 0; i < 15; ++i) {
+        spin_chain5_EACH_LANE
+        for (int lane = 0; lane < spin_chain5_LANES; ++lane)
+            size[lane] += fabs(delta[i][lane]) / (fabs(y[i][lane]) + norm[lane] + DBL_MIN);
+    }
+}
+
+/* The steps of a block one after the other, each along the lines of its lane. As X, the state with its carry, gains
+   increment - gain residual, the next residual follows from this one; X itself is added up apart. */
+static void spin_chain5_chain(spin_chain5_lines line[1], double x[15], double carry[15])
+{
+    double residual[15], sum[15], small[15];
+    for (int i = 0; i < 15; ++i) {
+        residual[i] = ((line->y[i][0] - x[i]) + line->displacement[i][0]) - carry[i];
+        sum[i] = x[i];
+        small[i] = carry[i];
+    }
+    for (int k = 0; k < 1 * spin_chain5_LANES; ++k) {
+        const int lane = k / 1, after = (k + 1) / 1 % spin_chain5_LANES;
+        spin_chain5_lines *at = &line[k % 1], *next = &line[(k + 1) % 1];
+        double correction[15] = { 0.0 };
+        for (int i = 0; i < 15; ++i) {
+            at->residual[i][lane] = residual[i];
+            for (int j = 0; j < 15; ++j) correction[i] -= at->gain[i * 15 + j][lane] * residual[j];
+        }
+        for (int i = 0; i < 15; ++i) {
+            const double change = at->increment[i][lane], total = sum[i] + change, added = total - sum[i];
+            const double turn = (next->displacement[i][after] - at->displacement[i][lane]) - change;
+            residual[i] = ((next->y[i][after] - at->y[i][lane]) + turn) + (residual[i] - correction[i]);
+            small[i] += ((sum[i] - (total - added)) + (change - added)) + correction[i];
+            sum[i] = total;
+        }
+    }
+    for (int i = 0; i < 15; ++i) {
+        x[i] = sum[i] + small[i];
+        carry[i] = small[i] - (x[i] - sum[i]);
+    }
+}
+
+/* Bring the table up to date. */
+static void spin_chain5_tell(const spin_chain5_solver *s, spin_chain5_table *table)
+{
+    for (int stage = 0; stage < 1; ++stage) {
+        if (table->fits[stage] == s->memory[stage].fits) continue;
+        table->fits[stage] = s->memory[stage].fits;
+        for (int k = 0; k < 33; ++k)
+            for (int lane = 0; lane < spin_chain5_LANES; ++lane) table->coef[stage][k][lane] = s->coef[stage][k];
+        memcpy(table->weight[stage], s->memory[stage].weight, sizeof table->weight[stage]);
+    }
+}
+
+/* The guesses for the next spin_chain5_LANES values. */
+static void spin_chain5_foresee(const spin_chain5_memory *memory, spin_chain5_lanes weight[restrict][15],
+    spin_chain5_lanes y[restrict 15])
+{
+    const int last = memory->count - 1;
+    for (int i = 0; i < 15; ++i) {
+        spin_chain5_EACH_LANE
+        for (int lane = 0; lane < spin_chain5_LANES; ++lane) {
+            double even = 0.0, odd = 0.0;
+            for (int k = 0; k < 32; k += 2) {
+                even += weight[k][i][lane] * memory->past[last - k][i];
+                odd += weight[k + 1][i][lane] * memory->past[last - 1 - k][i];
+            }
+            y[i][lane] = even + odd;
+        }
+    }
+}
+
+/* Correct y by the residuals that the chain found. The largest size of a correction; infinite if one is not finite. */
+static double spin_chain5_correct(spin_chain5_lines *line)
+{
+    spin_chain5_lanes size, delta[15];
+    double largest = 0.0, total = 0.0;
+    memset(delta, 0, sizeof delta);
+    for (int i = 0; i < 15; ++i)
+        for (int j = 0; j < 15; ++j) {
+            spin_chain5_EACH_LANE
+            for (int lane = 0; lane < spin_chain5_LANES; ++lane)
+                delta[i][lane] += line->inverse[i * 15 + j][lane] * line->residual[j][lane];
+        }
+    spin_chain5_sizes(line->y, delta, size);
+    for (int i = 0; i < 15; ++i)
+        for (int lane = 0; lane < spin_chain5_LANES; ++lane) line->y[i][lane] -= delta[i][lane];
+    for (int lane = 0; lane < spin_chain5_LANES; ++lane) {
+        total += size[lane];
+        largest = size[lane] > largest ? size[lane] : largest;
+    }
+    return isfinite(total) ? largest : HUGE_VAL;
+}
+
+/* spin_chain5_LANES steps at once: guess the points of all, and correct them together until the error that remains is as
+   small as after a single step. 0, and the solver as before, where that does not come about. */
+static int spin_chain5_block(spin_chain5_solver *s, spin_chain5_table *table)
+{
+    spin_chain5_lines line[1];
+    double x[15], carry[15], value[15], previous = HUGE_VAL;
+    int passes = 0, solved = 0;
+    for (int stage = 0; stage < 1; ++stage)
+        spin_chain5_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
+    while (!solved) {
+        double size = 0.0;
+        for (int stage = 0; stage < 1; ++stage) spin_chain5_tabulate(table->coef[stage], &line[stage]);
+        memcpy(x, s->x, sizeof x);
+        memcpy(carry, s->carry, sizeof carry);
+        spin_chain5_chain(line, x, carry);
+        for (int stage = 0; stage < 1; ++stage) size = fmax(size, spin_chain5_correct(&line[stage]));
+        s->evaluations += 1 * spin_chain5_LANES;
+        const double growth = size / (previous * previous);
+        /* The second test: after the square of so small a correction there is rounding only. */
+        solved = size * size * (growth > 1.0 ? growth : 1.0) <= 1e-20 || (previous < 1e-8 && size < 1e-10);
+        if (++passes == 4 || !(size < previous)) break;
+        previous = size;
+    }
+    for (int i = 0; i < 15; ++i)
+        if (!isfinite(x[i])) return 0;
+    if (!solved) return 0;
+    memcpy(s->x, x, sizeof x);
+    memcpy(s->carry, carry, sizeof carry);
+    s->steps += spin_chain5_LANES;
+    for (int stage = 0; stage < 1; ++stage) {
+        spin_chain5_memory *memory = &s->memory[stage];
+        for (int lane = 0; lane < spin_chain5_LANES; ++lane) {
+            for (int i = 0; i < 15; ++i) value[i] = line[stage].y[i][lane];
+            spin_chain5_record(memory, value);
+        }
+        memory->slow = passes > 1 ? memory->slow + spin_chain5_LANES : 0;
+        if (memory->slow > memory->patience) spin_chain5_fit(memory);
+    }
+    return 1;
+}
+
+/* Whether a block may be tried: not before there are recurrences to guess with, and not for a while after one that
+   failed. They take a thousand steps to repay. */
+static int spin_chain5_may_block(spin_chain5_solver *s, double h, size_t steps)
+{
+    int fit = s->setback > 0 && s->steps - s->fitted >= 1000;
+    if (!s->ready || memcmp(&h, &s->h, sizeof h) != 0 || steps < spin_chain5_LANES) return 0;
+    if (s->pause > 0) {
+        --s->pause;
+        return 0;
+    }
+    for (int stage = 0; stage < 1; ++stage) {
+        fit = fit || s->memory[stage].fits == 0;
+        if (s->memory[stage].count < 96) return 0;
+    }
+    if (fit && steps < 1000) return 0;
+    for (int stage = 0; stage < 1 && fit; ++stage) spin_chain5_fit(&s->memory[stage]);
+    if (fit) s->fitted = s->steps;
+    return 1;
+}
+
+/* Blocks of steps where the motion can be foreseen, single steps elsewhere: the results differ by round-off only. */
 spin_chain5_status spin_chain5_integrate(spin_chain5_solver *s, double h, size_t steps)
 {
-    for (size_t k = 0; k < steps; ++k) {
+    spin_chain5_table table;
+    for (int stage = 0; stage < 1; ++stage) table.fits[stage] = -1;
+    while (steps > 0) {
+        if (s != NULL && spin_chain5_may_block(s, h, steps)) {
+            spin_chain5_tell(s, &table);
+            if (spin_chain5_block(s, &table)) {
+                steps -= spin_chain5_LANES;
+                s->setback /= 2;
+                continue;
+            }
+            s->setback = 2 * s->setback + spin_chain5_LANES > 1000 ? 1000 : 2 * s->setback + spin_chain5_LANES;
+            s->pause = s->setback;
+        }
         const spin_chain5_status status = spin_chain5_step(s, h);
         if (status != spin_chain5_OK) return status;
+        --steps;
     }
     return spin_chain5_OK;
 }

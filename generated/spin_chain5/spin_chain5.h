@@ -14,13 +14,12 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: eaa3ea5d9adbeaa21ddfa116991f98c2487bd7b9749712286e4e5c8917055bec
+ * body-sha256: 5fafe2f0146a95473667ad6b698b731b693f9b36a0607601f5a720d2a8e8181f
  */
 #ifndef SPIN_CHAIN5_H
 #define SPIN_CHAIN5_H
 
 #include <stddef.h>
-
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -47,19 +46,17 @@ typedef enum {
     spin_chain5_BAD_ARGUMENT    /* a null pointer, or a value that is not finite */
 } spin_chain5_status;
 
-/* Recent values of the unknown of the inner solve, for its starting guess. Two predictors compete: extrapolation by
-   backward differences, and a linear recurrence fitted to the last 80 values; they affect speed only. */
+/* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
+   fitted to the last 96 values. They affect speed only. */
 typedef struct {
-    int rows;  /* rows of lag in use */
-    int guess; /* how many of them the extrapolation adds up */
-    int count; /* values in past */
-    int slow;  /* how many of the last steps took more than one iteration */
-    int trained; /* whether weight is set */
-    double lag[8][spin_chain5_DIM]; /* backward differences, order by order */
-    double past[160][spin_chain5_DIM];   /* values, the latest last */
-    double weight[16][spin_chain5_DIM]; /* of past values, the latest first */
-    double predicted[2][spin_chain5_DIM]; /* what the two predictors say of the next value */
-    double error[2];                     /* their recent errors */
+    int count;    /* values in past */
+    int order;    /* how many of them the extrapolation uses */
+    int fits;     /* how often weight has been fitted */
+    int fitting;  /* whether the recurrence is the better guess */
+    int slow;     /* how many of the last steps took more than one iteration */
+    int patience; /* how many of those before the recurrence is fitted again */
+    double past[192][spin_chain5_DIM]; /* values, the latest last */
+    double weight[32][spin_chain5_DIM][8]; /* of past values, the latest first, for the next values */
 } spin_chain5_memory;
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with spin_chain5_init. */
@@ -72,6 +69,9 @@ typedef struct {
     double gauge[5]; /* multiples of C1, C2, C3, C4, C5 taken from H */
     double h;  /* the step size that coef belongs to */
     int ready; /* whether coef has been computed */
+    int pause;   /* steps to make singly before a block is tried */
+    int setback; /* the last pause, halved with every block that succeeds */
+    size_t fitted; /* steps when recurrences were last fitted for blocks */
     double coef[1][33]; /* what depends on params and h only, for each stage */
     spin_chain5_memory memory[1];
 } spin_chain5_solver;

@@ -13,13 +13,12 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: a58f85217e5ee748414cb36d10bba95b215de0c64e7ae35c87ef850a753e1a5c
+ * body-sha256: b4ffcc49574b293ea7d7e8bfa3ee8b35d494075ac59256ccbbcabdb7560ab46d
  */
 #ifndef TODA3_H
 #define TODA3_H
 
 #include <stddef.h>
-
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -46,19 +45,17 @@ typedef enum {
     toda3_BAD_ARGUMENT    /* a null pointer, or a value that is not finite */
 } toda3_status;
 
-/* Recent values of the unknown of the inner solve, for its starting guess. Two predictors compete: extrapolation by
-   backward differences, and a linear recurrence fitted to the last 80 values; they affect speed only. */
+/* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
+   fitted to the last 96 values. They affect speed only. */
 typedef struct {
-    int rows;  /* rows of lag in use */
-    int guess; /* how many of them the extrapolation adds up */
-    int count; /* values in past */
-    int slow;  /* how many of the last steps took more than one iteration */
-    int trained; /* whether weight is set */
-    double lag[8][toda3_DIM]; /* backward differences, order by order */
-    double past[160][toda3_DIM];   /* values, the latest last */
-    double weight[16][toda3_DIM]; /* of past values, the latest first */
-    double predicted[2][toda3_DIM]; /* what the two predictors say of the next value */
-    double error[2];                     /* their recent errors */
+    int count;    /* values in past */
+    int order;    /* how many of them the extrapolation uses */
+    int fits;     /* how often weight has been fitted */
+    int fitting;  /* whether the recurrence is the better guess */
+    int slow;     /* how many of the last steps took more than one iteration */
+    int patience; /* how many of those before the recurrence is fitted again */
+    double past[192][toda3_DIM]; /* values, the latest last */
+    double weight[32][toda3_DIM][8]; /* of past values, the latest first, for the next values */
 } toda3_memory;
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with toda3_init. */
@@ -70,6 +67,9 @@ typedef struct {
     toda3_params params;
     double h;  /* the step size that coef belongs to */
     int ready; /* whether coef has been computed */
+    int pause;   /* steps to make singly before a block is tried */
+    int setback; /* the last pause, halved with every block that succeeds */
+    size_t fitted; /* steps when recurrences were last fitted for blocks */
     double coef[1][10]; /* what depends on params and h only, for each stage */
     toda3_memory memory[1];
 } toda3_solver;

@@ -12,13 +12,12 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 7218297741eb0e75fd61751cbbb1c7db9f30ae2c900e9c437de235bef422dfd6
+ * body-sha256: 39d01cc46219e3070c606327de187cd722908e37ae69dfed32ddfc5f6fa5f4d9
  */
 #ifndef TODA3_QUADRATIC_H
 #define TODA3_QUADRATIC_H
 
 #include <stddef.h>
-
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -45,19 +44,17 @@ typedef enum {
     toda3_quadratic_BAD_ARGUMENT    /* a null pointer, or a value that is not finite */
 } toda3_quadratic_status;
 
-/* Recent values of the unknown of the inner solve, for its starting guess. Two predictors compete: extrapolation by
-   backward differences, and a linear recurrence fitted to the last 80 values; they affect speed only. */
+/* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
+   fitted to the last 96 values. They affect speed only. */
 typedef struct {
-    int rows;  /* rows of lag in use */
-    int guess; /* how many of them the extrapolation adds up */
-    int count; /* values in past */
-    int slow;  /* how many of the last steps took more than one iteration */
-    int trained; /* whether weight is set */
-    double lag[8][toda3_quadratic_DIM]; /* backward differences, order by order */
-    double past[160][toda3_quadratic_DIM];   /* values, the latest last */
-    double weight[16][toda3_quadratic_DIM]; /* of past values, the latest first */
-    double predicted[2][toda3_quadratic_DIM]; /* what the two predictors say of the next value */
-    double error[2];                     /* their recent errors */
+    int count;    /* values in past */
+    int order;    /* how many of them the extrapolation uses */
+    int fits;     /* how often weight has been fitted */
+    int fitting;  /* whether the recurrence is the better guess */
+    int slow;     /* how many of the last steps took more than one iteration */
+    int patience; /* how many of those before the recurrence is fitted again */
+    double past[192][toda3_quadratic_DIM]; /* values, the latest last */
+    double weight[32][toda3_quadratic_DIM][1]; /* of past values, the latest first, for the next value */
 } toda3_quadratic_memory;
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with toda3_quadratic_init. */

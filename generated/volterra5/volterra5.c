@@ -13,12 +13,13 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 515927a8181a2bc692aad605a8c843c23c117c0dc1adb06fa7366a95362b40b0
+ * body-sha256: 421b3c88cad463f89d41f1c7927f46db0ef254320b18a15886097287ea53b996
  */
 #include "volterra5.h"
 
 #include <float.h>
 #include <math.h>
+#include <stdint.h>
 #include <string.h>
 
 const volterra5_params volterra5_default_params = { 0 };
@@ -251,119 +252,128 @@ static int volterra5_solve(double matrix[25], double side[5])
     return 1;
 }
 
-/* Keep the backward differences of a vector that varies slowly from step to step (y - x), and choose how
-   many of them to extrapolate with next time: the first difference left out estimates the error of the guess. */
-static void volterra5_difference(volterra5_memory *memory, const double value[5])
+/* The guess for the next value (y), from earlier ones; 0 if there are none. */
+static int volterra5_predict(const volterra5_memory *memory, double value[5])
 {
-    double row[5], least = HUGE_VAL;
-    const int rows = memory->rows < 8 ? memory->rows + 1 : 8;
-    memcpy(row, value, sizeof row);
-    for (int k = 0; k < rows; ++k) {
-        double size = 0.0;
-        for (int i = 0; i < 5; ++i) {
-            const double before = k < memory->rows ? memory->lag[k][i] : 0.0;
-            memory->lag[k][i] = row[i];
-            size += fabs(row[i]);
-            row[i] -= before;
+    const int last = memory->count - 1;
+    double odd[5] = { 0.0 }, binomial = -1.0;
+    memset(value, 0, 5 * sizeof value[0]);
+    if (memory->fitting) {
+        for (int k = 0; k < 32; k += 2)
+            for (int i = 0; i < 5; ++i) {
+                value[i] += memory->weight[k][i][0] * memory->past[last - k][i];
+                odd[i] += memory->weight[k + 1][i][0] * memory->past[last - 1 - k][i];
+            }
+        for (int i = 0; i < 5; ++i) value[i] += odd[i];
+    } else {
+        for (int k = 0; k < memory->order && k <= last; ++k) {
+            binomial *= -(double)(memory->order - k) / (k + 1);
+            for (int i = 0; i < 5; ++i) value[i] += binomial * memory->past[last - k][i];
         }
+    }
+    return last >= 0;
+}
+
+/* Choose the guess that would have been best for a value that took several iterations. */
+static void volterra5_judge(volterra5_memory *memory, const double value[5])
+{
+    double row[8 + 1][5], guess[5], least = HUGE_VAL, fitted = HUGE_VAL;
+    const int rows = memory->count < 8 ? memory->count : 8;
+    memcpy(row[0], value, sizeof row[0]);
+    for (int k = 0; k < rows; ++k) memcpy(row[k + 1], memory->past[memory->count - 1 - k], sizeof row[0]);
+    for (int order = 1; order <= rows; ++order) { /* row[0] becomes the backward difference of this order */
+        double size = 0.0;
+        for (int k = 0; k <= rows - order; ++k)
+            for (int i = 0; i < 5; ++i) row[k][i] -= row[k + 1][i];
+        for (int i = 0; i < 5; ++i) size += fabs(row[0][i]);
         if (size < least) {
             least = size;
-            memory->guess = k;
+            memory->order = order;
         }
     }
-    memory->rows = rows;
-}
-
-/* The guess of the better predictor; zero without a history. Both are kept, to be judged by the solved value. */
-static void volterra5_predict(volterra5_memory *memory, double value[5])
-{
-    double(*guess)[5] = memory->predicted;
-    memset(memory->predicted, 0, sizeof memory->predicted);
-    for (int k = 0; k < memory->guess; ++k)
-        for (int i = 0; i < 5; ++i) guess[0][i] += memory->lag[k][i];
-    if (memory->trained) {
-        const int last = memory->count - 1;
-        double odd[5] = { 0.0 };
-        for (int k = 0; k < 16; k += 2)
-            for (int i = 0; i < 5; ++i) {
-                guess[1][i] += memory->weight[k][i] * memory->past[last - k][i];
-                odd[i] += memory->weight[k + 1][i] * memory->past[last - 1 - k][i];
-            }
-        for (int i = 0; i < 5; ++i) guess[1][i] += odd[i];
+    memory->fitting = memory->fits > 0;
+    if (memory->fitting && volterra5_predict(memory, guess)) {
+        fitted = 0.0;
+        for (int i = 0; i < 5; ++i) fitted += fabs(value[i] - guess[i]);
     }
-    memcpy(value, guess[memory->trained && memory->error[1] <= memory->error[0]], 5 * sizeof value[0]);
+    memory->fitting = memory->fits > 0 && fitted <= least;
+    if (memory->order == 0) memory->order = 1;
 }
 
-/* Fit the recurrence value[m] = sum of weight[k] * value[m - 1 - k] to the history, component by component: ridge
-   least squares by modified Gram-Schmidt, the ridge at the level of rounding. */
+/* Fit the recurrences value[m + l] = sum of weight[k][..][l] * value[m - 1 - k], l = 0 ... 8 - 1, to the history,
+   component by component: ridge least squares by modified Gram-Schmidt, the ridge at the level of rounding. The last
+   8 columns of q are the right-hand sides. */
 static void volterra5_train(volterra5_memory *memory, int component)
 {
-    enum { ROWS = 80 - 16, ALL = 80 };
-    double q[16][ALL], r[16][16], b[ALL] = { 0.0 }, largest = 0.0;
-    const int first = memory->count - 80;
+    enum { WINDOW = 32, AHEAD = 8, ROWS = 96 - WINDOW - AHEAD + 1 };
+    double q[ROWS + WINDOW][WINDOW + AHEAD], r[WINDOW][WINDOW + AHEAD], largest = 0.0;
     memset(q, 0, sizeof q);
-    for (int i = 0; i < 80; ++i)
-        if (fabs(memory->past[first + i][component]) > largest) largest = fabs(memory->past[first + i][component]);
-    for (int k = 0; k < 16; ++k) {
-        for (int i = 0; i < ROWS; ++i) q[k][i] = memory->past[first + i + 16 - 1 - k][component];
-        q[k][ROWS + k] = 1e-13 * largest;
-    }
-    for (int i = 0; i < ROWS; ++i) b[i] = memory->past[first + i + 16][component];
-    for (int k = 0; k < 16; ++k) {
-        double norm = 0.0, along = 0.0;
-        for (int i = 0; i < ALL; ++i) norm += q[k][i] * q[k][i];
-        r[k][k] = sqrt(norm);
-        for (int i = 0; i < ALL; ++i) q[k][i] = norm > 0.0 ? q[k][i] / r[k][k] : 0.0;
-        for (int j = k + 1; j < 16; ++j) {
-            double dot = 0.0;
-            for (int i = 0; i < ALL; ++i) dot += q[k][i] * q[j][i];
-            r[k][j] = dot;
-            for (int i = 0; i < ALL; ++i) q[j][i] -= dot * q[k][i];
+    memset(r, 0, sizeof r);
+    for (int i = 0; i < ROWS; ++i) {
+        for (int j = 0; j < WINDOW + AHEAD; ++j) {
+            const int place = j < WINDOW ? WINDOW - 1 - j : j;
+            q[i][j] = memory->past[memory->count - 96 + i + place][component];
         }
-        for (int i = 0; i < ALL; ++i) along += q[k][i] * b[i];
-        memory->weight[k][component] = along;
-        for (int i = 0; i < ALL; ++i) b[i] -= along * q[k][i];
+        if (fabs(q[i][0]) > largest) largest = fabs(q[i][0]);
     }
-    for (int k = 16 - 1; k >= 0; --k) {
-        double sum = memory->weight[k][component];
-        for (int j = k + 1; j < 16; ++j) sum -= r[k][j] * memory->weight[j][component];
-        memory->weight[k][component] = r[k][k] > 0.0 ? sum / r[k][k] : 0.0;
+    for (int k = 0; k < WINDOW; ++k) q[ROWS + k][k] = 1e-13 * largest;
+    for (int k = 0; k < WINDOW; ++k) {
+        for (int i = 0; i < ROWS + WINDOW; ++i)
+            for (int j = k; j < WINDOW + AHEAD; ++j) r[k][j] += q[i][k] * q[i][j];
+        const double scale = r[k][k] > 0.0 ? 1.0 / r[k][k] : 0.0;
+        for (int j = k + 1; j < WINDOW + AHEAD; ++j) r[k][j] *= scale;
+        for (int i = 0; i < ROWS + WINDOW; ++i)
+            for (int j = k + 1; j < WINDOW + AHEAD; ++j) q[i][j] -= q[i][k] * r[k][j];
     }
+    for (int l = 0; l < AHEAD; ++l)
+        for (int k = WINDOW - 1; k >= 0; --k) {
+            double sum = r[k][WINDOW + l];
+            for (int j = k + 1; j < WINDOW; ++j) sum -= r[k][j] * memory->weight[j][component][l];
+            memory->weight[k][component][l] = sum;
+        }
 }
 
-/* Take in the solved value: update both predictors and their errors, and fit the recurrence when steps have been
-   taking several iterations. */
-static void volterra5_remember(volterra5_memory *memory, const double value[5], int iterations)
+/* Add a value to the history. */
+static void volterra5_record(volterra5_memory *memory, const double value[5])
 {
-    for (int kind = 0; kind < 2; ++kind) {
-        double error = 0.0;
-        for (int i = 0; i < 5; ++i) error += fabs(value[i] - memory->predicted[kind][i]);
-        memory->error[kind] = fmax(0.8 * memory->error[kind], error);
-    }
-    volterra5_difference(memory, value);
-    if (memory->count == 160) {
-        memmove(memory->past, memory->past + 160 - 80, 80 * sizeof memory->past[0]);
-        memory->count = 80;
+    if (memory->count == 192) {
+        memmove(memory->past, memory->past + 192 - 96, 96 * sizeof memory->past[0]);
+        memory->count = 96;
     }
     memcpy(memory->past[memory->count++], value, 5 * sizeof value[0]);
-    memory->slow = iterations > 1 ? memory->slow + 1 : 0;
-    if (memory->slow >= 80 && memory->count >= 80) {
-        for (int i = 0; i < 5; ++i) volterra5_train(memory, i);
-        memory->trained = 1;
-        memory->error[1] = 0.0;
-        memory->slow = -80;
-    }
 }
 
-/* x + change in compensated arithmetic. 0, and x as before, if the sum is not finite. */
-static int volterra5_advance(volterra5_solver *s, const double change[5])
+/* Fit the recurrence to the last values; with every time, wait longer before it is done again. */
+static void volterra5_fit(volterra5_memory *memory)
+{
+    for (int i = 0; i < 5; ++i) volterra5_train(memory, i);
+    memory->fitting = 1;
+    ++memory->fits;
+    memory->slow = 0;
+    memory->patience = memory->patience < 10000 ? 2 * memory->patience + 96 : 20000;
+}
+
+/* Take in the solved value: what took one iteration needs no better guess. */
+static void volterra5_remember(volterra5_memory *memory, const double value[5], int iterations)
+{
+    if (iterations > 1) volterra5_judge(memory, value);
+    volterra5_record(memory, value);
+    memory->slow = iterations > 1 ? memory->slow + 1 : 0;
+    if (memory->slow > memory->patience && memory->count >= 96) volterra5_fit(memory);
+}
+
+/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last
+   bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the
+   sum is not finite. */
+static int volterra5_advance(volterra5_solver *s, const double change[5], const double correction[5])
 {
     double x[5], carry[5];
     for (int i = 0; i < 5; ++i) {
-        const double addend = change[i] + s->carry[i];
-        x[i] = s->x[i] + addend;
-        const double added = x[i] - s->x[i];
-        carry[i] = (s->x[i] - (x[i] - added)) + (addend - added);
+        const double sum = s->x[i] + change[i], added = sum - s->x[i];
+        const double lost = (s->x[i] - (sum - added)) + (change[i] - added);
+        const double small = lost + (s->carry[i] + correction[i]);
+        x[i] = sum + small;
+        carry[i] = small - (x[i] - sum);
         if (!isfinite(x[i])) return 0;
     }
     memcpy(s->x, x, sizeof x);
@@ -386,20 +396,19 @@ static double volterra5_size(const double y[5], const double delta[5])
 
 /* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the extrapolated guess, and advance. The
    increment is corrected to first order by the last Newton correction, so that correction costs no evaluation:
-   a correction is accepted when the error that remains after it, quadratic in it, is below 1e-18. */
+   a correction is accepted when the error that remains after it, quadratic in it, is below 1e-20. */
 static volterra5_status volterra5_attempt(volterra5_solver *s, int stage)
 {
     const double *coef = s->coef[stage];
     volterra5_memory *memory = &s->memory[stage];
     double y[5], delta[5], displacement[5], increment[5];
     double jacobian[25], increment_jacobian[25];
-    volterra5_predict(memory, y);
-    for (int i = 0; i < 5; ++i) y[i] += s->x[i];
+    if (!volterra5_predict(memory, y)) memcpy(y, s->x, sizeof y);
     double previous = HUGE_VAL;
     for (int iteration = 0; iteration < 20; ++iteration) {
         volterra5_linearise(coef, y, displacement, increment, jacobian, increment_jacobian);
         ++s->evaluations;
-        for (int i = 0; i < 5; ++i) delta[i] = ((y[i] - s->x[i]) - s->carry[i]) + displacement[i];
+        for (int i = 0; i < 5; ++i) delta[i] = ((y[i] - s->x[i]) + displacement[i]) - s->carry[i];
         const int regular = volterra5_solve(jacobian, delta);
         const double size = volterra5_size(y, delta);
         if (!isfinite(size)) return volterra5_NOT_FINITE;
@@ -408,14 +417,12 @@ static volterra5_status volterra5_attempt(volterra5_solver *s, int stage)
         const double growth = size / (previous * previous);
         const double remaining = size * size * (growth > 1.0 ? growth : 1.0);
         /* The second test: corrections no longer shrink, the solve has reached the level of rounding. */
-        if (remaining <= 1e-18 || (previous < 1e-8 && size > 0.25 * previous)) {
-            double offset[5];
-            for (int i = 0; i < 5; ++i) {
-                offset[i] = y[i] - s->x[i];
-                for (int j = 0; j < 5; ++j) increment[i] -= increment_jacobian[i * 5 + j] * delta[j];
-            }
-            if (!volterra5_advance(s, increment)) return volterra5_NOT_FINITE;
-            volterra5_remember(memory, offset, iteration + 1);
+        if (remaining <= 1e-20 || (previous < 1e-8 && size > 0.25 * previous)) {
+            double correction[5] = { 0.0 };
+            for (int i = 0; i < 5; ++i)
+                for (int j = 0; j < 5; ++j) correction[i] -= increment_jacobian[i * 5 + j] * delta[j];
+            if (!volterra5_advance(s, increment, correction)) return volterra5_NOT_FINITE;
+            volterra5_remember(memory, y, iteration + 1);
             return volterra5_OK;
         }
         previous = size;
@@ -432,7 +439,7 @@ static volterra5_status volterra5_stages(volterra5_solver *s)
     memcpy(carry, s->carry, sizeof carry);
     for (int stage = 0; stage < 1; ++stage) {
         volterra5_status status = volterra5_attempt(s, stage);
-        if (status != volterra5_OK && s->memory[stage].rows > 0) {
+        if (status != volterra5_OK && s->memory[stage].count > 0) {
             memset(&s->memory[stage], 0, sizeof s->memory[stage]);
             status = volterra5_attempt(s, stage);
         }
@@ -471,11 +478,480 @@ volterra5_status volterra5_step(volterra5_solver *s, double h)
     return status;
 }
 
+/*
+ * Eight at a time: below, the formulas of a step are evaluated for 8 steps of a trajectory, or members of an
+ * ensemble, at once. Compilers make vector instructions of the loops over lanes.
+ */
+enum { volterra5_LANES = 8 };
+
+#if defined(__GNUC__)
+typedef double volterra5_lanes[volterra5_LANES] __attribute__((aligned(64))); /* a value in each lane */
+#else
+typedef double volterra5_lanes[volterra5_LANES];
+#endif
+
+#if defined(__clang__)
+#define volterra5_EACH_LANE _Pragma("clang loop vectorize(assume_safety)")
+#pragma clang diagnostic ignored "-Wpass-failed"
+#elif defined(__GNUC__)
+#define volterra5_EACH_LANE _Pragma("GCC ivdep") _Pragma("GCC unroll 1")
+#else
+#define volterra5_EACH_LANE
+#endif
+
+/* What all blocks share: coefficients, the same in each lane, and the recurrences by which they are foreseen. */
+typedef struct {
+    int fits[1]; /* the fit that weight is of; -1 for none */
+    volterra5_lanes coef[1][4], weight[1][32][5];
+} volterra5_table;
+
+/* A stage in all lanes, linear around y: a residual r of alpha(y) = x takes inverse r from y and gain r from the
+   increment. */
+typedef struct {
+    volterra5_lanes y[5], displacement[5], increment[5], residual[5];
+    volterra5_lanes inverse[25], slope[25], gain[25];
+} volterra5_lines;
+
+/* exp(u) - 1 for the loops over lanes: u = k log 2 + r, no branches. Infinite beyond |u| = 700.0. */
+static inline double volterra5_expm1_lane(double u)
+{
+    const double shifted = u * 1.4426950408889634 + 6755399441055744.0, k = shifted - 6755399441055744.0;
+    const double r = (u - k * 0.6931471803691238) - k * 1.9082149292705877e-10;
+    uint64_t bits; /* the last bits of shifted are k */
+    double power, sum = 1.1470745597729725e-11;
+    memcpy(&bits, &shifted, sizeof bits);
+    bits = (bits + 1023) << 52;
+    memcpy(&power, &bits, sizeof power);
+    sum = sum * r + 1.6059043836821613e-10;
+    sum = sum * r + 2.08767569878681e-09;
+    sum = sum * r + 2.505210838544172e-08;
+    sum = sum * r + 2.755731922398589e-07;
+    sum = sum * r + 2.7557319223985893e-06;
+    sum = sum * r + 2.48015873015873e-05;
+    sum = sum * r + 0.0001984126984126984;
+    sum = sum * r + 0.001388888888888889;
+    sum = sum * r + 0.008333333333333333;
+    sum = sum * r + 0.041666666666666664;
+    sum = sum * r + 0.16666666666666666;
+    sum = sum * r + 0.5;
+    sum = sum * r * r + r;
+    return power * sum + (power - 1.0) + (fabs(u) <= 700.0 ? 0.0 : HUGE_VAL);
+}
+
+/* volterra5_linearise in all lanes. */
+static void volterra5_linearise_lanes(volterra5_lanes coef[restrict 4], volterra5_lanes y[restrict 5],
+                                      volterra5_lanes displacement[restrict 5],
+                                      volterra5_lanes increment[restrict 5],
+                                      volterra5_lanes jacobian[restrict 25],
+                                      volterra5_lanes increment_jacobian[restrict 25])
+{
+    volterra5_EACH_LANE
+    for (int lane = 0; lane < volterra5_LANES; ++lane) {
+        const double v1 = y[0][lane];
+        const double v2 = y[1][lane];
+        const double v3 = y[2][lane];
+        const double v4 = y[3][lane];
+        const double v5 = y[4][lane];
+        const double t1 = coef[2][lane] * v4;
+        const double t2 = coef[3][lane] * v5;
+        const double t3 = coef[1][lane] * v1;
+        const double t4 = coef[2][lane] * v2;
+        const double t5 = coef[1][lane] * v4;
+        const double t6 = coef[2][lane] * v3;
+        const double p_v5 = v1 * (t1 + t2 + (t3 + t4)) + (coef[0][lane] + v4 * (t2 + (t5 + t6)));
+        const double t7 = v5 * p_v5;
+        const double t8 = coef[2][lane] * v5;
+        const double t9 = t8 + t6;
+        const double t10 = coef[3][lane] * v2;
+        const double t11 = coef[1][lane] * v3;
+        const double t12 = t1 + (t10 + t11);
+        const double p_v2 = v1 * (t9 + (t10 + t3)) + (coef[0][lane] + v3 * t12);
+        const double t13 = v2 * p_v2;
+        const double t14 = volterra5_expm1_lane(0.5 * (t7 - t13));
+        const double t15 = coef[3][lane] * v1;
+        const double t16 = coef[1][lane] * v2;
+        const double t17 = t9 + (t15 + t16);
+        const double t18 = coef[1][lane] * v5;
+        const double t19 = t18 + (t15 + t1);
+        const double p_v1 = v2 * t17 + (coef[0][lane] + v5 * t19);
+        const double t20 = v1 * p_v1;
+        const double t21 = coef[3][lane] * v3;
+        const double t22 = coef[2][lane] * v1;
+        const double t23 = t8 + (t5 + t21);
+        const double p_v3 = v2 * (t21 + t1 + (t16 + t22)) + (coef[0][lane] + v4 * t23);
+        const double t24 = v3 * p_v3;
+        const double t25 = volterra5_expm1_lane(0.5 * (t20 - t24));
+        const double t26 = coef[3][lane] * v4;
+        const double t27 = t18 + (t26 + t22);
+        const double p_v4 = v3 * (t8 + t26 + (t11 + t4)) + (coef[0][lane] + v5 * t27);
+        const double t28 = v4 * p_v4;
+        const double t29 = volterra5_expm1_lane(0.5 * (t13 - t28));
+        const double t30 = volterra5_expm1_lane(0.5 * (t24 - t7));
+        const double t31 = volterra5_expm1_lane(0.5 * (t28 - t20));
+        const double t32 = 1.0 + t14;
+        const double t33 = 1.0 / t32;
+        const double t34 = 1.0 + t33;
+        const double t35 = t14 * t34;
+        const double t36 = 1.0 + t25;
+        const double t37 = 1.0 / t36;
+        const double t38 = 1.0 + t37;
+        const double t39 = t25 * t38;
+        const double t40 = 1.0 + t29;
+        const double t41 = 1.0 / t40;
+        const double t42 = 1.0 + t41;
+        const double t43 = t29 * t42;
+        const double t44 = 1.0 + t30;
+        const double t45 = 1.0 / t44;
+        const double t46 = 1.0 + t45;
+        const double t47 = t30 * t46;
+        const double t48 = 1.0 + t31;
+        const double t49 = 1.0 / t48;
+        const double t50 = 1.0 + t49;
+        const double t51 = t31 * t50;
+        const double t52 = t4 + (t18 + t19);
+        const double t53 = v5 * t32;
+        const double t54 = v1 * t53;
+        const double t55 = t16 + t17;
+        const double t56 = v2 * t32;
+        const double t57 = v1 * t56;
+        const double t58 = t15 + t21;
+        const double t59 = p_v2 * t32;
+        const double t60 = t22 + (t11 + t12);
+        const double t61 = t6 + (t18 + t27);
+        const double t62 = p_v5 * t32;
+        const double t63 = t15 + t26;
+        const double t64 = p_v1 * t36;
+        const double t65 = t10 + t2;
+        const double t66 = v1 * t36;
+        const double t67 = v2 * t66;
+        const double t68 = v3 * t36;
+        const double t69 = v2 * t68;
+        const double t70 = t10 + t26;
+        const double t71 = p_v3 * t36;
+        const double t72 = t4 + (t5 + t23);
+        const double t73 = v2 * t40;
+        const double t74 = v3 * t73;
+        const double t75 = v4 * t40;
+        const double t76 = v3 * t75;
+        const double t77 = p_v2 * t40;
+        const double t78 = t21 + t2;
+        const double t79 = p_v4 * t40;
+        const double t80 = v3 * t44;
+        const double t81 = v4 * t80;
+        const double t82 = v5 * t44;
+        const double t83 = v4 * t82;
+        const double t84 = p_v3 * t44;
+        const double t85 = p_v5 * t44;
+        const double t86 = v4 * t48;
+        const double t87 = v5 * t86;
+        const double t88 = v1 * t48;
+        const double t89 = v5 * t88;
+        const double t90 = p_v1 * t48;
+        const double t91 = p_v4 * t48;
+        const double t92 = t33 * t33;
+        const double t93 = v1 * (0.5 * (t53 * t34) - 0.5 * (t14 * (t92 * t53)));
+        const double t94 = v1 * (0.5 * (t14 * (t92 * t56)) - 0.5 * (t56 * t34));
+        const double t95 = t37 * t37;
+        const double t96 = v2 * (0.5 * (t66 * t38) - 0.5 * (t25 * (t95 * t66)));
+        const double t97 = v2 * (0.5 * (t25 * (t95 * t68)) - 0.5 * (t68 * t38));
+        const double t98 = t41 * t41;
+        const double t99 = v3 * (0.5 * (t73 * t42) - 0.5 * (t29 * (t98 * t73)));
+        const double t100 = v3 * (0.5 * (t29 * (t98 * t75)) - 0.5 * (t75 * t42));
+        const double t101 = t45 * t45;
+        const double t102 = v4 * (0.5 * (t30 * (t82 * t101)) - 0.5 * (t82 * t46));
+        const double t103 = v4 * (0.5 * (t80 * t46) - 0.5 * (t30 * (t80 * t101)));
+        const double t104 = t49 * t49;
+        const double t105 = v5 * (0.5 * (t31 * (t104 * t88)) - 0.5 * (t88 * t50));
+        const double t106 = v5 * (0.5 * (t86 * t50) - 0.5 * (t31 * (t104 * t86)));
+        displacement[0][lane] = v1 * t14;
+        displacement[1][lane] = v2 * t25;
+        displacement[2][lane] = v3 * t29;
+        displacement[3][lane] = v4 * t30;
+        displacement[4][lane] = v5 * t31;
+        increment[0][lane] = -(v1 * t35);
+        increment[1][lane] = -(v2 * t39);
+        increment[2][lane] = -(v3 * t43);
+        increment[3][lane] = -(v4 * t47);
+        increment[4][lane] = -(v5 * t51);
+        jacobian[0][lane] = 1.0 + (t14 + (0.5 * (t52 * t54) - 0.5 * (t55 * t57)));
+        jacobian[1][lane] = 0.5 * (t22 * t54) - 0.5 * (t58 * t57) - 0.5 * (v1 * t59);
+        jacobian[2][lane] = 0.5 * (t1 * t54) - 0.5 * (t60 * t57);
+        jacobian[3][lane] = 0.5 * (t61 * t54) - 0.5 * (t6 * t57);
+        jacobian[4][lane] = 0.5 * (v1 * t62) + (0.5 * (t63 * t54) - 0.5 * (t22 * t57));
+        jacobian[5][lane] = 0.5 * (v2 * t64) + (0.5 * (t65 * t67) - 0.5 * (t4 * t69));
+        jacobian[6][lane] = 1.0 + (t25 + (0.5 * (t55 * t67) - 0.5 * (t60 * t69)));
+        jacobian[7][lane] = 0.5 * (t4 * t67) - 0.5 * (t70 * t69) - 0.5 * (v2 * t71);
+        jacobian[8][lane] = 0.5 * (t8 * t67) - 0.5 * (t72 * t69);
+        jacobian[9][lane] = 0.5 * (t52 * t67) - 0.5 * (t1 * t69);
+        jacobian[10][lane] = 0.5 * (t55 * t74) - 0.5 * (t8 * t76);
+        jacobian[11][lane] = 0.5 * (v3 * t77) + (0.5 * (t58 * t74) - 0.5 * (t6 * t76));
+        jacobian[12][lane] = 1.0 + (t29 + (0.5 * (t60 * t74) - 0.5 * (t72 * t76)));
+        jacobian[13][lane] = 0.5 * (t6 * t74) - 0.5 * (t78 * t76) - 0.5 * (v3 * t79);
+        jacobian[14][lane] = 0.5 * (t22 * t74) - 0.5 * (t61 * t76);
+        jacobian[15][lane] = 0.5 * (t4 * t81) - 0.5 * (t52 * t83);
+        jacobian[16][lane] = 0.5 * (t60 * t81) - 0.5 * (t22 * t83);
+        jacobian[17][lane] = 0.5 * (v4 * t84) + (0.5 * (t70 * t81) - 0.5 * (t1 * t83));
+        jacobian[18][lane] = 1.0 + (t30 + (0.5 * (t72 * t81) - 0.5 * (t61 * t83)));
+        jacobian[19][lane] = 0.5 * (t1 * t81) - 0.5 * (t63 * t83) - 0.5 * (v4 * t85);
+        jacobian[20][lane] = 0.5 * (t8 * t87) - 0.5 * (t65 * t89) - 0.5 * (v5 * t90);
+        jacobian[21][lane] = 0.5 * (t6 * t87) - 0.5 * (t55 * t89);
+        jacobian[22][lane] = 0.5 * (t72 * t87) - 0.5 * (t4 * t89);
+        jacobian[23][lane] = 0.5 * (v5 * t91) + (0.5 * (t78 * t87) - 0.5 * (t8 * t89));
+        jacobian[24][lane] = 1.0 + (t31 + (0.5 * (t61 * t87) - 0.5 * (t52 * t89)));
+        increment_jacobian[0][lane] = -(t35 + (t52 * t93 + t55 * t94));
+        increment_jacobian[1][lane] = -(v1 * (0.5 * (t14 * (t92 * t59)) - 0.5 * (t59 * t34)) + (t58 * t94 + t22 * t93));
+        increment_jacobian[2][lane] = -(t1 * t93 + t60 * t94);
+        increment_jacobian[3][lane] = -(t61 * t93 + t6 * t94);
+        increment_jacobian[4][lane] = -(v1 * (0.5 * (t62 * t34) - 0.5 * (t14 * (t92 * t62))) + (t63 * t93 + t22 * t94));
+        increment_jacobian[5][lane] = -(v2 * (0.5 * (t64 * t38) - 0.5 * (t25 * (t95 * t64))) + (t65 * t96 + t4 * t97));
+        increment_jacobian[6][lane] = -(t39 + (t60 * t97 + t55 * t96));
+        increment_jacobian[7][lane] = -(v2 * (0.5 * (t25 * (t95 * t71)) - 0.5 * (t71 * t38)) + (t4 * t96 + t70 * t97));
+        increment_jacobian[8][lane] = -(t72 * t97 + t8 * t96);
+        increment_jacobian[9][lane] = -(t52 * t96 + t1 * t97);
+        increment_jacobian[10][lane] = -(t55 * t99 + t8 * t100);
+        increment_jacobian[11][lane] = -(v3 * (0.5 * (t77 * t42) - 0.5 * (t29 * (t77 * t98))) + (t6 * t100 + t58 * t99));
+        increment_jacobian[12][lane] = -(t43 + (t60 * t99 + t72 * t100));
+        increment_jacobian[13][lane] = -(v3 * (0.5 * (t29 * (t98 * t79)) - 0.5 * (t79 * t42)) + (t78 * t100 + t6 * t99));
+        increment_jacobian[14][lane] = -(t61 * t100 + t22 * t99);
+        increment_jacobian[15][lane] = -(t52 * t102 + t4 * t103);
+        increment_jacobian[16][lane] = -(t60 * t103 + t22 * t102);
+        increment_jacobian[17][lane] = -(v4 * (0.5 * (t84 * t46) - 0.5 * (t30 * (t84 * t101))) + (t70 * t103 + t1 * t102));
+        increment_jacobian[18][lane] = -(t47 + (t61 * t102 + t72 * t103));
+        increment_jacobian[19][lane] = -(v4 * (0.5 * (t30 * (t85 * t101)) - 0.5 * (t85 * t46)) + (t1 * t103 + t63 * t102));
+        increment_jacobian[20][lane] = -(v5 * (0.5 * (t31 * (t104 * t90)) - 0.5 * (t90 * t50)) + (t65 * t105 + t8 * t106));
+        increment_jacobian[21][lane] = -(t55 * t105 + t6 * t106);
+        increment_jacobian[22][lane] = -(t72 * t106 + t4 * t105);
+        increment_jacobian[23][lane] = -(v5 * (0.5 * (t91 * t50) - 0.5 * (t31 * (t104 * t91))) + (t78 * t106 + t8 * t105));
+        increment_jacobian[24][lane] = -(t51 + (t52 * t105 + t61 * t106));
+    }
+}
+
+/* Invert the matrices of all lanes in place by elimination without pivoting: they are I + O(h). Infinite where a pivot is
+   far from 1. */
+static void volterra5_invert(volterra5_lanes matrix[restrict 25])
+{
+    for (int k = 0; k < 5; ++k) {
+        volterra5_lanes factor[5];
+        volterra5_EACH_LANE
+        for (int lane = 0; lane < volterra5_LANES; ++lane) {
+            const double reciprocal = 1.0 / matrix[k * 5 + k][lane];
+            matrix[k * 5 + k][lane] = 1.0;
+            for (int j = 0; j < 5; ++j) matrix[k * 5 + j][lane] *= reciprocal;
+            matrix[k * 5 + k][lane] += fabs(reciprocal) < 1e3 ? 0.0 : HUGE_VAL;
+        }
+        for (int i = 0; i < 5; ++i) {
+            volterra5_EACH_LANE
+            for (int lane = 0; lane < volterra5_LANES; ++lane) {
+                factor[i][lane] = matrix[i * 5 + k][lane];
+                if (i != k) matrix[i * 5 + k][lane] = 0.0;
+            }
+        }
+        for (int i = 0; i < 5; ++i)
+            for (int j = 0; j < 5 && i != k; ++j) {
+                volterra5_EACH_LANE
+                for (int lane = 0; lane < volterra5_LANES; ++lane)
+                    matrix[i * 5 + j][lane] -= factor[i][lane] * matrix[k * 5 + j][lane];
+            }
+    }
+}
+
+/* Everything about a stage at the points y. */
+static void volterra5_tabulate(volterra5_lanes coef[restrict], volterra5_lines *line)
+{
+    volterra5_linearise_lanes(coef, line->y, line->displacement, line->increment, line->inverse, line->slope);
+    volterra5_invert(line->inverse);
+    for (int i = 0; i < 5; ++i)
+        for (int j = 0; j < 5; ++j) {
+            volterra5_lanes sum = { 0.0 };
+            for (int k = 0; k < 5; ++k) {
+                volterra5_EACH_LANE
+                for (int lane = 0; lane < volterra5_LANES; ++lane)
+                    sum[lane] += line->slope[i * 5 + k][lane] * line->inverse[k * 5 + j][lane];
+            }
+            memcpy(line->gain[i * 5 + j], sum, sizeof sum);
+        }
+}
+
+/* volterra5_size in all lanes, summed over the components. */
+static void volterra5_sizes(volterra5_lanes y[restrict 5], volterra5_lanes delta[restrict 5],
+    volterra5_lanes size)
+{
+    volterra5_lanes norm = { 0.0 };
+    memset(size, 0, volterra5_LANES * sizeof size[0]);
+    for (int i = 0; i < 5; ++i)
+        for (int lane = 0; lane < volterra5_LANES; ++lane)
+            norm[lane] = 0.0 * fabs(y[i][lane]) > norm[lane] ? 0.0 * fabs(y[i][lane]) : norm[lane];
+    for (int i = 0; i < 5; ++i) {
+        volterra5_EACH_LANE
+        for (int lane = 0; lane < volterra5_LANES; ++lane)
+            size[lane] += fabs(delta[i][lane]) / (fabs(y[i][lane]) + norm[lane] + DBL_MIN);
+    }
+}
+
+/* The steps of a block one after the other, each along the lines of its lane. As X, the state with its carry, gains
+   increment - gain residual, the next residual follows from this one; X itself is added up apart. */
+static void volterra5_chain(volterra5_lines line[1], double x[5], double carry[5])
+{
+    double residual[5], sum[5], small[5];
+    for (int i = 0; i < 5; ++i) {
+        residual[i] = ((line->y[i][0] - x[i]) + line->displacement[i][0]) - carry[i];
+        sum[i] = x[i];
+        small[i] = carry[i];
+    }
+    for (int k = 0; k < 1 * volterra5_LANES; ++k) {
+        const int lane = k / 1, after = (k + 1) / 1 % volterra5_LANES;
+        volterra5_lines *at = &line[k % 1], *next = &line[(k + 1) % 1];
+        double correction[5] = { 0.0 };
+        for (int i = 0; i < 5; ++i) {
+            at->residual[i][lane] = residual[i];
+            for (int j = 0; j < 5; ++j) correction[i] -= at->gain[i * 5 + j][lane] * residual[j];
+        }
+        for (int i = 0; i < 5; ++i) {
+            const double change = at->increment[i][lane], total = sum[i] + change, added = total - sum[i];
+            const double turn = (next->displacement[i][after] - at->displacement[i][lane]) - change;
+            residual[i] = ((next->y[i][after] - at->y[i][lane]) + turn) + (residual[i] - correction[i]);
+            small[i] += ((sum[i] - (total - added)) + (change - added)) + correction[i];
+            sum[i] = total;
+        }
+    }
+    for (int i = 0; i < 5; ++i) {
+        x[i] = sum[i] + small[i];
+        carry[i] = small[i] - (x[i] - sum[i]);
+    }
+}
+
+/* Bring the table up to date. */
+static void volterra5_tell(const volterra5_solver *s, volterra5_table *table)
+{
+    for (int stage = 0; stage < 1; ++stage) {
+        if (table->fits[stage] == s->memory[stage].fits) continue;
+        table->fits[stage] = s->memory[stage].fits;
+        for (int k = 0; k < 4; ++k)
+            for (int lane = 0; lane < volterra5_LANES; ++lane) table->coef[stage][k][lane] = s->coef[stage][k];
+        memcpy(table->weight[stage], s->memory[stage].weight, sizeof table->weight[stage]);
+    }
+}
+
+/* The guesses for the next volterra5_LANES values. */
+static void volterra5_foresee(const volterra5_memory *memory, volterra5_lanes weight[restrict][5],
+    volterra5_lanes y[restrict 5])
+{
+    const int last = memory->count - 1;
+    for (int i = 0; i < 5; ++i) {
+        volterra5_EACH_LANE
+        for (int lane = 0; lane < volterra5_LANES; ++lane) {
+            double even = 0.0, odd = 0.0;
+            for (int k = 0; k < 32; k += 2) {
+                even += weight[k][i][lane] * memory->past[last - k][i];
+                odd += weight[k + 1][i][lane] * memory->past[last - 1 - k][i];
+            }
+            y[i][lane] = even + odd;
+        }
+    }
+}
+
+/* Correct y by the residuals that the chain found. The largest size of a correction; infinite if one is not finite. */
+static double volterra5_correct(volterra5_lines *line)
+{
+    volterra5_lanes size, delta[5];
+    double largest = 0.0, total = 0.0;
+    memset(delta, 0, sizeof delta);
+    for (int i = 0; i < 5; ++i)
+        for (int j = 0; j < 5; ++j) {
+            volterra5_EACH_LANE
+            for (int lane = 0; lane < volterra5_LANES; ++lane)
+                delta[i][lane] += line->inverse[i * 5 + j][lane] * line->residual[j][lane];
+        }
+    volterra5_sizes(line->y, delta, size);
+    for (int i = 0; i < 5; ++i)
+        for (int lane = 0; lane < volterra5_LANES; ++lane) line->y[i][lane] -= delta[i][lane];
+    for (int lane = 0; lane < volterra5_LANES; ++lane) {
+        total += size[lane];
+        largest = size[lane] > largest ? size[lane] : largest;
+    }
+    return isfinite(total) ? largest : HUGE_VAL;
+}
+
+/* volterra5_LANES steps at once: guess the points of all, and correct them together until the error that remains is as
+   small as after a single step. 0, and the solver as before, where that does not come about. */
+static int volterra5_block(volterra5_solver *s, volterra5_table *table)
+{
+    volterra5_lines line[1];
+    double x[5], carry[5], value[5], previous = HUGE_VAL;
+    int passes = 0, solved = 0;
+    for (int stage = 0; stage < 1; ++stage)
+        volterra5_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
+    while (!solved) {
+        double size = 0.0;
+        for (int stage = 0; stage < 1; ++stage) volterra5_tabulate(table->coef[stage], &line[stage]);
+        memcpy(x, s->x, sizeof x);
+        memcpy(carry, s->carry, sizeof carry);
+        volterra5_chain(line, x, carry);
+        for (int stage = 0; stage < 1; ++stage) size = fmax(size, volterra5_correct(&line[stage]));
+        s->evaluations += 1 * volterra5_LANES;
+        const double growth = size / (previous * previous);
+        /* The second test: after the square of so small a correction there is rounding only. */
+        solved = size * size * (growth > 1.0 ? growth : 1.0) <= 1e-20 || (previous < 1e-8 && size < 1e-10);
+        if (++passes == 4 || !(size < previous)) break;
+        previous = size;
+    }
+    for (int i = 0; i < 5; ++i)
+        if (!isfinite(x[i])) return 0;
+    if (!solved) return 0;
+    memcpy(s->x, x, sizeof x);
+    memcpy(s->carry, carry, sizeof carry);
+    s->steps += volterra5_LANES;
+    for (int stage = 0; stage < 1; ++stage) {
+        volterra5_memory *memory = &s->memory[stage];
+        for (int lane = 0; lane < volterra5_LANES; ++lane) {
+            for (int i = 0; i < 5; ++i) value[i] = line[stage].y[i][lane];
+            volterra5_record(memory, value);
+        }
+        memory->slow = passes > 1 ? memory->slow + volterra5_LANES : 0;
+        if (memory->slow > memory->patience) volterra5_fit(memory);
+    }
+    return 1;
+}
+
+/* Whether a block may be tried: not before there are recurrences to guess with, and not for a while after one that
+   failed. They take a thousand steps to repay. */
+static int volterra5_may_block(volterra5_solver *s, double h, size_t steps)
+{
+    int fit = s->setback > 0 && s->steps - s->fitted >= 1000;
+    if (!s->ready || memcmp(&h, &s->h, sizeof h) != 0 || steps < volterra5_LANES) return 0;
+    if (s->pause > 0) {
+        --s->pause;
+        return 0;
+    }
+    for (int stage = 0; stage < 1; ++stage) {
+        fit = fit || s->memory[stage].fits == 0;
+        if (s->memory[stage].count < 96) return 0;
+    }
+    if (fit && steps < 1000) return 0;
+    for (int stage = 0; stage < 1 && fit; ++stage) volterra5_fit(&s->memory[stage]);
+    if (fit) s->fitted = s->steps;
+    return 1;
+}
+
+/* Blocks of steps where the motion can be foreseen, single steps elsewhere: the results differ by round-off only. */
 volterra5_status volterra5_integrate(volterra5_solver *s, double h, size_t steps)
 {
-    for (size_t k = 0; k < steps; ++k) {
+    volterra5_table table;
+    for (int stage = 0; stage < 1; ++stage) table.fits[stage] = -1;
+    while (steps > 0) {
+        if (s != NULL && volterra5_may_block(s, h, steps)) {
+            volterra5_tell(s, &table);
+            if (volterra5_block(s, &table)) {
+                steps -= volterra5_LANES;
+                s->setback /= 2;
+                continue;
+            }
+            s->setback = 2 * s->setback + volterra5_LANES > 1000 ? 1000 : 2 * s->setback + volterra5_LANES;
+            s->pause = s->setback;
+        }
         const volterra5_status status = volterra5_step(s, h);
         if (status != volterra5_OK) return status;
+        --steps;
     }
     return volterra5_OK;
 }

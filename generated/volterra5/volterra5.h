@@ -13,13 +13,12 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 89286ea50663eed76d3b46f29b1534785ecd5abbc0bc242207bfe04d3749e811
+ * body-sha256: 3386b521fcb3138984699699ce486405d8c6ad61bb7c96a7c247fa12976c817f
  */
 #ifndef VOLTERRA5_H
 #define VOLTERRA5_H
 
 #include <stddef.h>
-
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -46,19 +45,17 @@ typedef enum {
     volterra5_BAD_ARGUMENT    /* a null pointer, or a value that is not finite */
 } volterra5_status;
 
-/* Recent values of the unknown of the inner solve, for its starting guess. Two predictors compete: extrapolation by
-   backward differences, and a linear recurrence fitted to the last 80 values; they affect speed only. */
+/* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
+   fitted to the last 96 values. They affect speed only. */
 typedef struct {
-    int rows;  /* rows of lag in use */
-    int guess; /* how many of them the extrapolation adds up */
-    int count; /* values in past */
-    int slow;  /* how many of the last steps took more than one iteration */
-    int trained; /* whether weight is set */
-    double lag[8][volterra5_DIM]; /* backward differences, order by order */
-    double past[160][volterra5_DIM];   /* values, the latest last */
-    double weight[16][volterra5_DIM]; /* of past values, the latest first */
-    double predicted[2][volterra5_DIM]; /* what the two predictors say of the next value */
-    double error[2];                     /* their recent errors */
+    int count;    /* values in past */
+    int order;    /* how many of them the extrapolation uses */
+    int fits;     /* how often weight has been fitted */
+    int fitting;  /* whether the recurrence is the better guess */
+    int slow;     /* how many of the last steps took more than one iteration */
+    int patience; /* how many of those before the recurrence is fitted again */
+    double past[192][volterra5_DIM]; /* values, the latest last */
+    double weight[32][volterra5_DIM][8]; /* of past values, the latest first, for the next values */
 } volterra5_memory;
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with volterra5_init. */
@@ -70,6 +67,9 @@ typedef struct {
     volterra5_params params;
     double h;  /* the step size that coef belongs to */
     int ready; /* whether coef has been computed */
+    int pause;   /* steps to make singly before a block is tried */
+    int setback; /* the last pause, halved with every block that succeeds */
+    size_t fitted; /* steps when recurrences were last fitted for blocks */
     double coef[1][4]; /* what depends on params and h only, for each stage */
     volterra5_memory memory[1];
 } volterra5_solver;

@@ -13,12 +13,13 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 67bee6301529aac37234d884cc52554a5f56f161b1b1069730dba0a85fef7b9e
+ * body-sha256: 4f6db6d4284692fcb0da28d69d4c28c49a7da9aa390f49de25f4b48577869e03
  */
 #include "vortices3.h"
 
 #include <float.h>
 #include <math.h>
+#include <stdint.h>
 #include <string.h>
 
 const vortices3_params vortices3_default_params = { 0 };
@@ -758,119 +759,128 @@ static int vortices3_solve(double matrix[36], double side[6])
     return 1;
 }
 
-/* Keep the backward differences of a vector that varies slowly from step to step (y - x), and choose how
-   many of them to extrapolate with next time: the first difference left out estimates the error of the guess. */
-static void vortices3_difference(vortices3_memory *memory, const double value[6])
+/* The guess for the next value (y), from earlier ones; 0 if there are none. */
+static int vortices3_predict(const vortices3_memory *memory, double value[6])
 {
-    double row[6], least = HUGE_VAL;
-    const int rows = memory->rows < 8 ? memory->rows + 1 : 8;
-    memcpy(row, value, sizeof row);
-    for (int k = 0; k < rows; ++k) {
-        double size = 0.0;
-        for (int i = 0; i < 6; ++i) {
-            const double before = k < memory->rows ? memory->lag[k][i] : 0.0;
-            memory->lag[k][i] = row[i];
-            size += fabs(row[i]);
-            row[i] -= before;
+    const int last = memory->count - 1;
+    double odd[6] = { 0.0 }, binomial = -1.0;
+    memset(value, 0, 6 * sizeof value[0]);
+    if (memory->fitting) {
+        for (int k = 0; k < 32; k += 2)
+            for (int i = 0; i < 6; ++i) {
+                value[i] += memory->weight[k][i][0] * memory->past[last - k][i];
+                odd[i] += memory->weight[k + 1][i][0] * memory->past[last - 1 - k][i];
+            }
+        for (int i = 0; i < 6; ++i) value[i] += odd[i];
+    } else {
+        for (int k = 0; k < memory->order && k <= last; ++k) {
+            binomial *= -(double)(memory->order - k) / (k + 1);
+            for (int i = 0; i < 6; ++i) value[i] += binomial * memory->past[last - k][i];
         }
+    }
+    return last >= 0;
+}
+
+/* Choose the guess that would have been best for a value that took several iterations. */
+static void vortices3_judge(vortices3_memory *memory, const double value[6])
+{
+    double row[8 + 1][6], guess[6], least = HUGE_VAL, fitted = HUGE_VAL;
+    const int rows = memory->count < 8 ? memory->count : 8;
+    memcpy(row[0], value, sizeof row[0]);
+    for (int k = 0; k < rows; ++k) memcpy(row[k + 1], memory->past[memory->count - 1 - k], sizeof row[0]);
+    for (int order = 1; order <= rows; ++order) { /* row[0] becomes the backward difference of this order */
+        double size = 0.0;
+        for (int k = 0; k <= rows - order; ++k)
+            for (int i = 0; i < 6; ++i) row[k][i] -= row[k + 1][i];
+        for (int i = 0; i < 6; ++i) size += fabs(row[0][i]);
         if (size < least) {
             least = size;
-            memory->guess = k;
+            memory->order = order;
         }
     }
-    memory->rows = rows;
-}
-
-/* The guess of the better predictor; zero without a history. Both are kept, to be judged by the solved value. */
-static void vortices3_predict(vortices3_memory *memory, double value[6])
-{
-    double(*guess)[6] = memory->predicted;
-    memset(memory->predicted, 0, sizeof memory->predicted);
-    for (int k = 0; k < memory->guess; ++k)
-        for (int i = 0; i < 6; ++i) guess[0][i] += memory->lag[k][i];
-    if (memory->trained) {
-        const int last = memory->count - 1;
-        double odd[6] = { 0.0 };
-        for (int k = 0; k < 16; k += 2)
-            for (int i = 0; i < 6; ++i) {
-                guess[1][i] += memory->weight[k][i] * memory->past[last - k][i];
-                odd[i] += memory->weight[k + 1][i] * memory->past[last - 1 - k][i];
-            }
-        for (int i = 0; i < 6; ++i) guess[1][i] += odd[i];
+    memory->fitting = memory->fits > 0;
+    if (memory->fitting && vortices3_predict(memory, guess)) {
+        fitted = 0.0;
+        for (int i = 0; i < 6; ++i) fitted += fabs(value[i] - guess[i]);
     }
-    memcpy(value, guess[memory->trained && memory->error[1] <= memory->error[0]], 6 * sizeof value[0]);
+    memory->fitting = memory->fits > 0 && fitted <= least;
+    if (memory->order == 0) memory->order = 1;
 }
 
-/* Fit the recurrence value[m] = sum of weight[k] * value[m - 1 - k] to the history, component by component: ridge
-   least squares by modified Gram-Schmidt, the ridge at the level of rounding. */
+/* Fit the recurrences value[m + l] = sum of weight[k][..][l] * value[m - 1 - k], l = 0 ... 8 - 1, to the history,
+   component by component: ridge least squares by modified Gram-Schmidt, the ridge at the level of rounding. The last
+   8 columns of q are the right-hand sides. */
 static void vortices3_train(vortices3_memory *memory, int component)
 {
-    enum { ROWS = 80 - 16, ALL = 80 };
-    double q[16][ALL], r[16][16], b[ALL] = { 0.0 }, largest = 0.0;
-    const int first = memory->count - 80;
+    enum { WINDOW = 32, AHEAD = 8, ROWS = 96 - WINDOW - AHEAD + 1 };
+    double q[ROWS + WINDOW][WINDOW + AHEAD], r[WINDOW][WINDOW + AHEAD], largest = 0.0;
     memset(q, 0, sizeof q);
-    for (int i = 0; i < 80; ++i)
-        if (fabs(memory->past[first + i][component]) > largest) largest = fabs(memory->past[first + i][component]);
-    for (int k = 0; k < 16; ++k) {
-        for (int i = 0; i < ROWS; ++i) q[k][i] = memory->past[first + i + 16 - 1 - k][component];
-        q[k][ROWS + k] = 1e-13 * largest;
-    }
-    for (int i = 0; i < ROWS; ++i) b[i] = memory->past[first + i + 16][component];
-    for (int k = 0; k < 16; ++k) {
-        double norm = 0.0, along = 0.0;
-        for (int i = 0; i < ALL; ++i) norm += q[k][i] * q[k][i];
-        r[k][k] = sqrt(norm);
-        for (int i = 0; i < ALL; ++i) q[k][i] = norm > 0.0 ? q[k][i] / r[k][k] : 0.0;
-        for (int j = k + 1; j < 16; ++j) {
-            double dot = 0.0;
-            for (int i = 0; i < ALL; ++i) dot += q[k][i] * q[j][i];
-            r[k][j] = dot;
-            for (int i = 0; i < ALL; ++i) q[j][i] -= dot * q[k][i];
+    memset(r, 0, sizeof r);
+    for (int i = 0; i < ROWS; ++i) {
+        for (int j = 0; j < WINDOW + AHEAD; ++j) {
+            const int place = j < WINDOW ? WINDOW - 1 - j : j;
+            q[i][j] = memory->past[memory->count - 96 + i + place][component];
         }
-        for (int i = 0; i < ALL; ++i) along += q[k][i] * b[i];
-        memory->weight[k][component] = along;
-        for (int i = 0; i < ALL; ++i) b[i] -= along * q[k][i];
+        if (fabs(q[i][0]) > largest) largest = fabs(q[i][0]);
     }
-    for (int k = 16 - 1; k >= 0; --k) {
-        double sum = memory->weight[k][component];
-        for (int j = k + 1; j < 16; ++j) sum -= r[k][j] * memory->weight[j][component];
-        memory->weight[k][component] = r[k][k] > 0.0 ? sum / r[k][k] : 0.0;
+    for (int k = 0; k < WINDOW; ++k) q[ROWS + k][k] = 1e-13 * largest;
+    for (int k = 0; k < WINDOW; ++k) {
+        for (int i = 0; i < ROWS + WINDOW; ++i)
+            for (int j = k; j < WINDOW + AHEAD; ++j) r[k][j] += q[i][k] * q[i][j];
+        const double scale = r[k][k] > 0.0 ? 1.0 / r[k][k] : 0.0;
+        for (int j = k + 1; j < WINDOW + AHEAD; ++j) r[k][j] *= scale;
+        for (int i = 0; i < ROWS + WINDOW; ++i)
+            for (int j = k + 1; j < WINDOW + AHEAD; ++j) q[i][j] -= q[i][k] * r[k][j];
     }
+    for (int l = 0; l < AHEAD; ++l)
+        for (int k = WINDOW - 1; k >= 0; --k) {
+            double sum = r[k][WINDOW + l];
+            for (int j = k + 1; j < WINDOW; ++j) sum -= r[k][j] * memory->weight[j][component][l];
+            memory->weight[k][component][l] = sum;
+        }
 }
 
-/* Take in the solved value: update both predictors and their errors, and fit the recurrence when steps have been
-   taking several iterations. */
-static void vortices3_remember(vortices3_memory *memory, const double value[6], int iterations)
+/* Add a value to the history. */
+static void vortices3_record(vortices3_memory *memory, const double value[6])
 {
-    for (int kind = 0; kind < 2; ++kind) {
-        double error = 0.0;
-        for (int i = 0; i < 6; ++i) error += fabs(value[i] - memory->predicted[kind][i]);
-        memory->error[kind] = fmax(0.8 * memory->error[kind], error);
-    }
-    vortices3_difference(memory, value);
-    if (memory->count == 160) {
-        memmove(memory->past, memory->past + 160 - 80, 80 * sizeof memory->past[0]);
-        memory->count = 80;
+    if (memory->count == 192) {
+        memmove(memory->past, memory->past + 192 - 96, 96 * sizeof memory->past[0]);
+        memory->count = 96;
     }
     memcpy(memory->past[memory->count++], value, 6 * sizeof value[0]);
-    memory->slow = iterations > 1 ? memory->slow + 1 : 0;
-    if (memory->slow >= 80 && memory->count >= 80) {
-        for (int i = 0; i < 6; ++i) vortices3_train(memory, i);
-        memory->trained = 1;
-        memory->error[1] = 0.0;
-        memory->slow = -80;
-    }
 }
 
-/* x + change in compensated arithmetic. 0, and x as before, if the sum is not finite. */
-static int vortices3_advance(vortices3_solver *s, const double change[6])
+/* Fit the recurrence to the last values; with every time, wait longer before it is done again. */
+static void vortices3_fit(vortices3_memory *memory)
+{
+    for (int i = 0; i < 6; ++i) vortices3_train(memory, i);
+    memory->fitting = 1;
+    ++memory->fits;
+    memory->slow = 0;
+    memory->patience = memory->patience < 10000 ? 2 * memory->patience + 96 : 20000;
+}
+
+/* Take in the solved value: what took one iteration needs no better guess. */
+static void vortices3_remember(vortices3_memory *memory, const double value[6], int iterations)
+{
+    if (iterations > 1) vortices3_judge(memory, value);
+    vortices3_record(memory, value);
+    memory->slow = iterations > 1 ? memory->slow + 1 : 0;
+    if (memory->slow > memory->patience && memory->count >= 96) vortices3_fit(memory);
+}
+
+/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last
+   bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the
+   sum is not finite. */
+static int vortices3_advance(vortices3_solver *s, const double change[6], const double correction[6])
 {
     double x[6], carry[6];
     for (int i = 0; i < 6; ++i) {
-        const double addend = change[i] + s->carry[i];
-        x[i] = s->x[i] + addend;
-        const double added = x[i] - s->x[i];
-        carry[i] = (s->x[i] - (x[i] - added)) + (addend - added);
+        const double sum = s->x[i] + change[i], added = sum - s->x[i];
+        const double lost = (s->x[i] - (sum - added)) + (change[i] - added);
+        const double small = lost + (s->carry[i] + correction[i]);
+        x[i] = sum + small;
+        carry[i] = small - (x[i] - sum);
         if (!isfinite(x[i])) return 0;
     }
     memcpy(s->x, x, sizeof x);
@@ -894,20 +904,19 @@ static double vortices3_size(const double y[6], const double delta[6])
 
 /* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the extrapolated guess, and advance. The
    increment is corrected to first order by the last Newton correction, so that correction costs no evaluation:
-   a correction is accepted when the error that remains after it, quadratic in it, is below 1e-18. */
+   a correction is accepted when the error that remains after it, quadratic in it, is below 1e-20. */
 static vortices3_status vortices3_attempt(vortices3_solver *s, int stage)
 {
     const double *coef = s->coef[stage];
     vortices3_memory *memory = &s->memory[stage];
     double y[6], delta[6], displacement[6], increment[6];
     double jacobian[36], increment_jacobian[36];
-    vortices3_predict(memory, y);
-    for (int i = 0; i < 6; ++i) y[i] += s->x[i];
+    if (!vortices3_predict(memory, y)) memcpy(y, s->x, sizeof y);
     double previous = HUGE_VAL;
     for (int iteration = 0; iteration < 20; ++iteration) {
         vortices3_linearise(coef, y, displacement, increment, jacobian, increment_jacobian);
         ++s->evaluations;
-        for (int i = 0; i < 6; ++i) delta[i] = ((y[i] - s->x[i]) - s->carry[i]) + displacement[i];
+        for (int i = 0; i < 6; ++i) delta[i] = ((y[i] - s->x[i]) + displacement[i]) - s->carry[i];
         const int regular = vortices3_solve(jacobian, delta);
         const double size = vortices3_size(y, delta);
         if (!isfinite(size)) return vortices3_NOT_FINITE;
@@ -916,14 +925,12 @@ static vortices3_status vortices3_attempt(vortices3_solver *s, int stage)
         const double growth = size / (previous * previous);
         const double remaining = size * size * (growth > 1.0 ? growth : 1.0);
         /* The second test: corrections no longer shrink, the solve has reached the level of rounding. */
-        if (remaining <= 1e-18 || (previous < 1e-8 && size > 0.25 * previous)) {
-            double offset[6];
-            for (int i = 0; i < 6; ++i) {
-                offset[i] = y[i] - s->x[i];
-                for (int j = 0; j < 6; ++j) increment[i] -= increment_jacobian[i * 6 + j] * delta[j];
-            }
-            if (!vortices3_advance(s, increment)) return vortices3_NOT_FINITE;
-            vortices3_remember(memory, offset, iteration + 1);
+        if (remaining <= 1e-20 || (previous < 1e-8 && size > 0.25 * previous)) {
+            double correction[6] = { 0.0 };
+            for (int i = 0; i < 6; ++i)
+                for (int j = 0; j < 6; ++j) correction[i] -= increment_jacobian[i * 6 + j] * delta[j];
+            if (!vortices3_advance(s, increment, correction)) return vortices3_NOT_FINITE;
+            vortices3_remember(memory, y, iteration + 1);
             return vortices3_OK;
         }
         previous = size;
@@ -940,7 +947,7 @@ static vortices3_status vortices3_stages(vortices3_solver *s)
     memcpy(carry, s->carry, sizeof carry);
     for (int stage = 0; stage < 1; ++stage) {
         vortices3_status status = vortices3_attempt(s, stage);
-        if (status != vortices3_OK && s->memory[stage].rows > 0) {
+        if (status != vortices3_OK && s->memory[stage].count > 0) {
             memset(&s->memory[stage], 0, sizeof s->memory[stage]);
             status = vortices3_attempt(s, stage);
         }
@@ -979,11 +986,964 @@ vortices3_status vortices3_step(vortices3_solver *s, double h)
     return status;
 }
 
+/*
+ * Eight at a time: below, the formulas of a step are evaluated for 8 steps of a trajectory, or members of an
+ * ensemble, at once. Compilers make vector instructions of the loops over lanes.
+ */
+enum { vortices3_LANES = 8 };
+
+#if defined(__GNUC__)
+typedef double vortices3_lanes[vortices3_LANES] __attribute__((aligned(64))); /* a value in each lane */
+#else
+typedef double vortices3_lanes[vortices3_LANES];
+#endif
+
+#if defined(__clang__)
+#define vortices3_EACH_LANE _Pragma("clang loop vectorize(assume_safety)")
+#pragma clang diagnostic ignored "-Wpass-failed"
+#elif defined(__GNUC__)
+#define vortices3_EACH_LANE _Pragma("GCC ivdep") _Pragma("GCC unroll 1")
+#else
+#define vortices3_EACH_LANE
+#endif
+
+/* What all blocks share: coefficients, the same in each lane, and the recurrences by which they are foreseen. */
+typedef struct {
+    int fits[1]; /* the fit that weight is of; -1 for none */
+    vortices3_lanes coef[1][3], weight[1][32][6];
+} vortices3_table;
+
+/* A stage in all lanes, linear around y: a residual r of alpha(y) = x takes inverse r from y and gain r from the
+   increment. */
+typedef struct {
+    vortices3_lanes y[6], displacement[6], increment[6], residual[6];
+    vortices3_lanes inverse[36], slope[36], gain[36];
+} vortices3_lines;
+
+/* vortices3_linearise_lanes_part1 (part 1 of 4) */
+vortices3_APART static void vortices3_linearise_lanes_part1(vortices3_lanes coef[restrict 3],
+                                                            vortices3_lanes y[restrict 6],
+                                                            vortices3_lanes displacement[restrict 6],
+                                                            vortices3_lanes increment[restrict 6],
+                                                            vortices3_lanes jacobian[restrict 36],
+                                                            vortices3_lanes increment_jacobian[restrict 36],
+                                                            vortices3_lanes work[restrict 218])
+{
+    vortices3_EACH_LANE
+    for (int lane = 0; lane < vortices3_LANES; ++lane) {
+        const double x1 = y[0][lane];
+        const double y1_ = y[1][lane];
+        const double x2 = y[2][lane];
+        const double y2 = y[3][lane];
+        const double x3 = y[4][lane];
+        const double y3 = y[5][lane];
+        work[6][lane] = x1 - x3;
+        work[4][lane] = y1_ - y3;
+        work[23][lane] = 1.0 / (work[6][lane] * work[6][lane] + work[4][lane] * work[4][lane]);
+        work[9][lane] = coef[0][lane] * work[23][lane];
+        const double t5 = 0.25 * (work[6][lane] * work[9][lane]);
+        work[3][lane] = x1 - x2;
+        work[0][lane] = y1_ - y2;
+        work[12][lane] = 1.0 / (work[0][lane] * work[0][lane] + work[3][lane] * work[3][lane]);
+        work[8][lane] = coef[0][lane] * work[12][lane];
+        const double t10 = work[3][lane] * work[8][lane];
+        const double t11 = 0.5 * (t5 - t10);
+        work[18][lane] = x2 - x3;
+        work[17][lane] = y2 - y3;
+        work[19][lane] = 1.0 / (work[17][lane] * work[17][lane] + work[18][lane] * work[18][lane]);
+        work[48][lane] = coef[0][lane] * work[19][lane];
+        const double t16 = 0.5 * (work[18][lane] * work[48][lane]);
+        const double t17 = 0.25 * (t10 + t16);
+        work[10][lane] = t11 - t17;
+        const double t19 = work[0][lane] * work[8][lane];
+        const double t20 = 0.5 * (work[17][lane] * work[48][lane]);
+        const double t21 = t19 + t20;
+        const double t22 = work[4][lane] * work[9][lane];
+        const double t23 = 0.25 * t22 - t19;
+        work[7][lane] = 0.25 * t21 - 0.5 * t23;
+        work[13][lane] = 2.0 * (work[0][lane] * work[10][lane]) + 2.0 * (work[3][lane] * work[7][lane]);
+        work[14][lane] = work[12][lane] * work[13][lane];
+        work[11][lane] = coef[1][lane] * work[13][lane];
+        work[15][lane] = work[12][lane] * work[11][lane];
+        work[34][lane] = 1.0 / 12.0 * (coef[1][lane] * (work[12][lane] * work[14][lane])) + 1.0 / 12.0 * (work[12][lane] * work[15][lane]);
+        const double t30 = 2.0 * (work[3][lane] * work[34][lane]);
+        work[16][lane] = coef[1][lane] * work[12][lane];
+        const double t32 = 1.0 / 3.0 * (work[16][lane] * work[7][lane]);
+        work[20][lane] = coef[1][lane] * work[19][lane];
+        const double t34 = (-0.25) * t22 - t20;
+        work[45][lane] = (-0.25) * t21 - t34;
+        const double t36 = t5 + t16;
+        work[44][lane] = t17 - t36;
+        work[43][lane] = 2.0 * (work[17][lane] * work[44][lane]) + 2.0 * (work[18][lane] * work[45][lane]);
+        work[42][lane] = work[19][lane] * work[43][lane];
+        work[41][lane] = coef[1][lane] * work[43][lane];
+        work[40][lane] = work[19][lane] * work[41][lane];
+        work[47][lane] = (-1.0 / 24.0) * (coef[1][lane] * (work[19][lane] * work[42][lane])) - 1.0 / 24.0 * (work[19][lane] * work[40][lane]);
+        const double t43 = 1.0 / 6.0 * (work[20][lane] * work[45][lane]) + 2.0 * (work[18][lane] * work[47][lane]);
+        const double t44 = 0.25 * (t30 - t32) - 0.25 * t43;
+        work[28][lane] = coef[1][lane] * work[23][lane];
+        work[27][lane] = (-0.5) * t23 - t34;
+        work[22][lane] = t11 - t36;
+        work[26][lane] = 2.0 * (work[4][lane] * work[22][lane]) + 2.0 * (work[6][lane] * work[27][lane]);
+        work[25][lane] = work[23][lane] * work[26][lane];
+        work[21][lane] = coef[1][lane] * work[26][lane];
+        work[24][lane] = work[23][lane] * work[21][lane];
+        work[39][lane] = (-1.0 / 48.0) * (coef[1][lane] * (work[23][lane] * work[25][lane])) - 1.0 / 48.0 * (work[23][lane] * work[24][lane]);
+        const double t53 = 1.0 / 12.0 * (work[28][lane] * work[27][lane]) + 2.0 * (work[6][lane] * work[39][lane]);
+        const double t54 = 0.5 * t53;
+        const double t55 = 0.5 * (t32 - t30);
+        work[2][lane] = t44 + (t54 - t55);
+        work[1][lane] = work[12][lane] * work[12][lane];
+        const double t58 = 1.0 / 3.0 * (work[16][lane] * work[10][lane]);
+        const double t59 = 2.0 * (work[0][lane] * work[34][lane]);
+        const double t60 = 1.0 / 6.0 * (work[20][lane] * work[44][lane]) + 2.0 * (work[17][lane] * work[47][lane]);
+        work[112][lane] = 0.25 * (t58 - t59 + t60);
+        const double t62 = 1.0 / 12.0 * (work[28][lane] * work[22][lane]) + 2.0 * (work[4][lane] * work[39][lane]);
+        work[111][lane] = 0.5 * (t59 - t58 + t62);
+        work[49][lane] = work[112][lane] - work[111][lane];
+        work[30][lane] = 1.0 / 12.0 * (work[14][lane] * work[11][lane]) + 1.0 / 12.0 * (work[13][lane] * work[15][lane]) + (coef[0][lane] * (work[3][lane] * work[49][lane] + work[0][lane] * work[2][lane]) - 1.0 / 6.0 * (coef[1][lane] * (work[10][lane] * work[10][lane] + work[7][lane] * work[7][lane])));
+        const double t66 = (-0.5) * (coef[2][lane] * work[12][lane]) - work[1][lane] * work[30][lane];
+        const double t67 = 2.0 * (work[10][lane] * work[34][lane]) + work[8][lane] * work[2][lane] + 2.0 * (work[0][lane] * t66);
+        const double t68 = t53 + t43;
+        work[36][lane] = 0.25 * t68 + 0.25 * (t55 - t54);
+        work[5][lane] = work[23][lane] * work[23][lane];
+        const double t71 = t62 + t60;
+        work[50][lane] = work[111][lane] - t71;
+        work[38][lane] = (-1.0 / 48.0) * (work[25][lane] * work[21][lane]) - 1.0 / 48.0 * (work[26][lane] * work[24][lane]) + (1.0 / 24.0 * (coef[1][lane] * (work[27][lane] * work[27][lane] + work[22][lane] * work[22][lane])) + coef[0][lane] * (work[4][lane] * work[36][lane] + 0.25 * (work[6][lane] * work[50][lane])));
+        work[35][lane] = 0.125 * (coef[2][lane] * work[23][lane]) - work[5][lane] * work[38][lane];
+        const double t75 = 2.0 * (work[22][lane] * work[39][lane]) + work[9][lane] * work[36][lane] + 2.0 * (work[4][lane] * work[35][lane]);
+        const double p_y1 = t67 + t75;
+        const double t76 = 2.0 * (work[7][lane] * work[34][lane]) + work[8][lane] * work[49][lane] + 2.0 * (work[3][lane] * t66);
+        const double t77 = 2.0 * (work[27][lane] * work[39][lane]) + 0.25 * (work[9][lane] * work[50][lane]) + 2.0 * (work[6][lane] * work[35][lane]);
+        const double p_x1 = t76 + t77;
+        work[75][lane] = t68 + t44;
+        work[46][lane] = work[19][lane] * work[19][lane];
+        work[86][lane] = work[112][lane] - t71;
+        work[85][lane] = (-1.0 / 24.0) * (work[42][lane] * work[41][lane]) - 1.0 / 24.0 * (work[43][lane] * work[40][lane]) + (1.0 / 12.0 * (coef[1][lane] * (work[45][lane] * work[45][lane] + work[44][lane] * work[44][lane])) + coef[0][lane] * (0.5 * (work[17][lane] * work[75][lane]) + 0.5 * (work[18][lane] * work[86][lane])));
+        work[130][lane] = 0.25 * (coef[2][lane] * work[19][lane]) - work[46][lane] * work[85][lane];
+        const double t83 = 2.0 * (work[44][lane] * work[47][lane]) + 0.5 * (work[48][lane] * work[75][lane]) + 2.0 * (work[17][lane] * work[130][lane]);
+        const double p_y2 = t83 - t67;
+        const double t84 = 2.0 * (work[45][lane] * work[47][lane]) + 0.5 * (work[48][lane] * work[86][lane]) + 2.0 * (work[18][lane] * work[130][lane]);
+        const double p_x2 = t84 - t76;
+        const double t85 = t75 + t83;
+        const double p_y3 = -t85;
+        const double t86 = t84 + t77;
+        const double t87 = 0.25 * work[9][lane];
+        const double t88 = work[6][lane] * work[5][lane];
+        work[56][lane] = coef[0][lane] * t88;
+        const double t90 = 0.5 * (work[6][lane] * work[56][lane]);
+        work[147][lane] = t87 - t90;
+        const double t92 = work[3][lane] * work[1][lane];
+        work[51][lane] = coef[0][lane] * t92;
+        const double t94 = 2.0 * (work[3][lane] * work[51][lane]);
+        work[74][lane] = t94 - work[8][lane];
+        const double t96 = 0.5 * (work[147][lane] + work[74][lane]);
+        work[78][lane] = work[8][lane] - t94;
+        const double t98 = 0.25 * work[78][lane];
+        const double t99 = t96 - t98;
+        work[118][lane] = 2.0 * (work[51][lane] * work[2][lane]);
+        work[79][lane] = 2.0 * work[7][lane];
+        work[77][lane] = work[0][lane] * work[51][lane];
+        work[76][lane] = 2.0 * work[77][lane];
+        work[155][lane] = work[4][lane] * work[56][lane];
+        work[149][lane] = 0.5 * work[155][lane];
+        const double t106 = 0.5 * (work[76][lane] - work[149][lane]);
+        work[53][lane] = (-0.5) * work[77][lane] - t106;
+        const double t108 = work[79][lane] + (2.0 * (work[3][lane] * work[53][lane]) + 2.0 * (work[0][lane] * t99));
+        const double t109 = coef[1][lane] * t108;
+        work[80][lane] = 1.0 / 6.0 * (t92 * work[11][lane]);
+        const double t111 = 1.0 / 12.0 * (work[12][lane] * t109) - work[80][lane];
+        work[81][lane] = 1.0 / 6.0 * (t92 * work[13][lane]);
+        const double t113 = 1.0 / 12.0 * (work[12][lane] * t108) - work[81][lane];
+        work[83][lane] = 1.0 / 6.0 * (t92 * work[14][lane]);
+        work[82][lane] = 1.0 / 6.0 * (t92 * work[15][lane]);
+        work[52][lane] = work[12][lane] * t111 + (coef[1][lane] * (work[12][lane] * t113 - work[83][lane]) - work[82][lane]);
+        work[32][lane] = 2.0 * work[39][lane];
+        const double t118 = coef[1][lane] * t88;
+        work[162][lane] = 1.0 / 6.0 * (t118 * work[27][lane]);
+        work[57][lane] = 0.5 * (work[149][lane] - work[76][lane]) - work[149][lane];
+        work[158][lane] = t88 * work[21][lane];
+        work[156][lane] = t90 - t87;
+        const double t123 = work[156][lane] + t96;
+        work[157][lane] = 2.0 * work[27][lane];
+        const double t125 = 2.0 * (work[4][lane] * t123) + (work[157][lane] + 2.0 * (work[6][lane] * work[57][lane]));
+        const double t126 = coef[1][lane] * t125;
+        const double t127 = 1.0 / 24.0 * work[158][lane] - 1.0 / 48.0 * (work[23][lane] * t126);
+        work[161][lane] = 1.0 / 24.0 * (t88 * work[24][lane]);
+        work[160][lane] = 1.0 / 24.0 * (t88 * work[25][lane]);
+        work[159][lane] = t88 * work[26][lane];
+        const double t131 = 1.0 / 24.0 * work[159][lane] - 1.0 / 48.0 * (work[23][lane] * t125);
+        work[58][lane] = work[23][lane] * t127 + (work[161][lane] + coef[1][lane] * (work[160][lane] + work[23][lane] * t131));
+        const double t133 = work[32][lane] - work[162][lane] + (1.0 / 12.0 * (work[28][lane] * work[57][lane]) + 2.0 * (work[6][lane] * work[58][lane]));
+        const double t134 = coef[1][lane] * t92;
+        work[84][lane] = t134 * work[7][lane];
+        const double t136 = 0.5 * work[77][lane];
+        const double t137 = t136 + t106;
+        work[31][lane] = 2.0 * work[34][lane];
+        const double t139 = 2.0 / 3.0 * work[84][lane] + 1.0 / 3.0 * (work[16][lane] * t137) + (work[31][lane] + 2.0 * (work[3][lane] * work[52][lane]));
+        const double t140 = 0.5 * t139;
+        work[69][lane] = t136 - work[149][lane];
+        work[70][lane] = work[156][lane] + t98;
+        work[65][lane] = 2.0 * (work[18][lane] * work[69][lane]) + 2.0 * (work[17][lane] * work[70][lane]);
+        work[66][lane] = work[19][lane] * work[65][lane];
+        work[67][lane] = coef[1][lane] * work[65][lane];
+        work[68][lane] = work[19][lane] * work[67][lane];
+        work[71][lane] = (-1.0 / 24.0) * (coef[1][lane] * (work[19][lane] * work[66][lane])) - 1.0 / 24.0 * (work[19][lane] * work[68][lane]);
+        const double t148 = 1.0 / 6.0 * (work[20][lane] * work[69][lane]) + 2.0 * (work[18][lane] * work[71][lane]);
+        work[64][lane] = 0.25 * t139 - 0.25 * t148;
+        const double t150 = 0.5 * t133 + t140 + work[64][lane];
+        work[29][lane] = work[12][lane] * work[1][lane];
+        work[113][lane] = work[29][lane] * (work[3][lane] * work[30][lane]);
+        const double t153 = t98 - t96;
+        const double t154 = 1.0 / 6.0 * (work[20][lane] * work[70][lane]) + 2.0 * (work[17][lane] * work[71][lane]);
+        work[93][lane] = 2.0 / 3.0 * (t134 * work[10][lane]);
+        const double t156 = work[93][lane] + 1.0 / 3.0 * (work[16][lane] * t153) + 2.0 * (work[0][lane] * work[52][lane]);
+        work[61][lane] = 0.25 * (t154 - t156);
+        work[164][lane] = 1.0 / 6.0 * (t118 * work[22][lane]);
+        const double t159 = 1.0 / 12.0 * (work[28][lane] * t123) + (2.0 * (work[4][lane] * work[58][lane]) - work[164][lane]);
+        const double t160 = 0.5 * (t156 + t159);
+        work[54][lane] = work[61][lane] - t160;
+        const double t162 = coef[2][lane] * (x2 - x1) + coef[1][lane] * (1.0 / 3.0 * (work[7][lane] * t137) + 1.0 / 3.0 * (work[10][lane] * t153)) + (1.0 / 12.0 * (work[15][lane] * t108) + work[11][lane] * t113) + (1.0 / 12.0 * (work[14][lane] * t109) + work[13][lane] * t111 + coef[0][lane] * (work[0][lane] * t150 + (work[49][lane] + work[3][lane] * work[54][lane])));
+        work[55][lane] = 4.0 * work[113][lane] - work[1][lane] * t162;
+        work[72][lane] = 2.0 * (t99 * work[34][lane]) - work[118][lane] + (2.0 * (work[10][lane] * work[52][lane]) + work[8][lane] * t150) + 2.0 * (work[0][lane] * work[55][lane]);
+        work[168][lane] = 2.0 * (work[56][lane] * work[36][lane]);
+        work[63][lane] = t148 + t133;
+        const double t167 = 0.25 * work[63][lane] + 0.25 * ((-0.5) * t133 - t140);
+        work[37][lane] = work[23][lane] * work[5][lane];
+        work[166][lane] = work[37][lane] * (work[6][lane] * work[38][lane]);
+        work[167][lane] = coef[2][lane] * work[6][lane];
+        work[165][lane] = 0.25 * work[50][lane];
+        work[62][lane] = t154 + t159;
+        work[59][lane] = t160 - work[62][lane];
+        const double t174 = coef[1][lane] * (1.0 / 12.0 * (work[27][lane] * work[57][lane]) + 1.0 / 12.0 * (work[22][lane] * t123)) + work[26][lane] * t127 + coef[0][lane] * (work[4][lane] * t167 + (work[165][lane] + 0.25 * (work[6][lane] * work[59][lane])));
+        work[60][lane] = 4.0 * work[166][lane] - work[5][lane] * (0.25 * work[167][lane] - 1.0 / 48.0 * (t125 * work[24][lane]) + (work[21][lane] * t131 - 1.0 / 48.0 * (work[25][lane] * t126)) + t174);
+        work[73][lane] = 2.0 * (t123 * work[39][lane]) - work[168][lane] + (2.0 * (work[22][lane] * work[58][lane]) + work[9][lane] * t167) + 2.0 * (work[4][lane] * work[60][lane]);
+        const double t177 = work[72][lane] + work[73][lane];
+        const double t178 = 0.5 * t177;
+        work[33][lane] = 2.0 * t66;
+        displacement[0][lane] = (-0.5) * p_y1;
+        increment[0][lane] = p_y1;
+        displacement[1][lane] = 0.5 * p_x1;
+        increment[1][lane] = -p_x1;
+        displacement[2][lane] = (-0.25) * p_y2;
+        increment[2][lane] = 0.5 * p_y2;
+        displacement[3][lane] = 0.25 * p_x2;
+        increment[3][lane] = (-0.5) * p_x2;
+        increment[4][lane] = 2.0 * t85;
+        displacement[4][lane] = p_y3;
+        displacement[5][lane] = t86;
+        increment[5][lane] = (-2.0) * t86;
+        increment_jacobian[0][lane] = t177;
+        increment_jacobian[7][lane] = -t177;
+        jacobian[0][lane] = 1.0 - t178;
+        jacobian[7][lane] = 1.0 + t178;
+    }
+}
+
+/* vortices3_linearise_lanes_part2 (part 2 of 4) */
+vortices3_APART static void vortices3_linearise_lanes_part2(vortices3_lanes coef[restrict 3],
+                                                            vortices3_lanes y[restrict 6],
+                                                            vortices3_lanes displacement[restrict 6],
+                                                            vortices3_lanes increment[restrict 6],
+                                                            vortices3_lanes jacobian[restrict 36],
+                                                            vortices3_lanes increment_jacobian[restrict 36],
+                                                            vortices3_lanes work[restrict 218])
+{
+    (void)displacement;
+    (void)increment;
+    vortices3_EACH_LANE
+    for (int lane = 0; lane < vortices3_LANES; ++lane) {
+        const double y1_ = y[1][lane];
+        const double y2 = y[3][lane];
+        const double t180 = work[0][lane] * work[1][lane];
+        const double t181 = coef[0][lane] * t180;
+        work[134][lane] = 2.0 * (t181 * work[2][lane]);
+        work[122][lane] = work[3][lane] * t181;
+        const double t184 = 0.5 * work[122][lane];
+        work[119][lane] = 2.0 * work[122][lane];
+        const double t186 = work[4][lane] * work[5][lane];
+        const double t187 = coef[0][lane] * t186;
+        work[169][lane] = work[6][lane] * t187;
+        const double t189 = 0.5 * work[169][lane];
+        const double t190 = work[119][lane] - t189;
+        const double t191 = 0.5 * t190;
+        const double t192 = t184 + t191;
+        const double t193 = coef[1][lane] * t180;
+        work[129][lane] = 2.0 / 3.0 * (t193 * work[7][lane]);
+        const double t195 = 2.0 * (work[0][lane] * t181);
+        work[121][lane] = t195 - work[8][lane];
+        work[170][lane] = 2.0 * (work[4][lane] * t187);
+        const double t198 = 0.25 * (work[9][lane] - work[170][lane]);
+        const double t199 = 0.5 * (work[121][lane] + t198);
+        work[123][lane] = work[8][lane] - t195;
+        const double t201 = 0.25 * work[123][lane];
+        const double t202 = t199 - t201;
+        work[124][lane] = 2.0 * work[10][lane];
+        const double t204 = t201 - t199;
+        const double t205 = work[124][lane] + (2.0 * (work[0][lane] * t192) + 2.0 * (work[3][lane] * t204));
+        const double t206 = coef[1][lane] * t205;
+        work[125][lane] = 1.0 / 6.0 * (t180 * work[11][lane]);
+        const double t208 = 1.0 / 12.0 * (work[12][lane] * t206) - work[125][lane];
+        work[126][lane] = 1.0 / 6.0 * (t180 * work[13][lane]);
+        const double t210 = 1.0 / 12.0 * (work[12][lane] * t205) - work[126][lane];
+        work[128][lane] = 1.0 / 6.0 * (t180 * work[14][lane]);
+        work[127][lane] = 1.0 / 6.0 * (t180 * work[15][lane]);
+        const double t213 = work[12][lane] * t208 + (coef[1][lane] * (work[12][lane] * t210 - work[128][lane]) - work[127][lane]);
+        const double t214 = work[129][lane] + 1.0 / 3.0 * (work[16][lane] * t202) + 2.0 * (work[3][lane] * t213);
+        const double t215 = 0.25 * work[121][lane] + t198;
+        const double t216 = t189 - t184;
+        const double t217 = 2.0 * (work[17][lane] * t216) + 2.0 * (work[18][lane] * t215);
+        const double t218 = work[19][lane] * t217;
+        const double t219 = coef[1][lane] * t217;
+        const double t220 = work[19][lane] * t219;
+        const double t221 = (-1.0 / 24.0) * (coef[1][lane] * (work[19][lane] * t218)) - 1.0 / 24.0 * (work[19][lane] * t220);
+        const double t222 = 1.0 / 6.0 * (work[20][lane] * t215) + 2.0 * (work[18][lane] * t221);
+        const double t223 = 0.25 * t214 - 0.25 * t222;
+        const double t224 = t198 + 0.5 * (work[123][lane] - t198);
+        work[172][lane] = t186 * work[21][lane];
+        work[171][lane] = 2.0 * work[22][lane];
+        const double t227 = t189 + t191;
+        const double t228 = work[171][lane] + 2.0 * (work[4][lane] * t227) + 2.0 * (work[6][lane] * t224);
+        const double t229 = coef[1][lane] * t228;
+        const double t230 = 1.0 / 24.0 * work[172][lane] - 1.0 / 48.0 * (work[23][lane] * t229);
+        work[175][lane] = 1.0 / 24.0 * (t186 * work[24][lane]);
+        work[174][lane] = 1.0 / 24.0 * (t186 * work[25][lane]);
+        work[173][lane] = 1.0 / 24.0 * (t186 * work[26][lane]);
+        const double t234 = work[173][lane] - 1.0 / 48.0 * (work[23][lane] * t228);
+        const double t235 = work[23][lane] * t230 + (work[175][lane] + coef[1][lane] * (work[174][lane] + work[23][lane] * t234));
+        const double t236 = coef[1][lane] * t186;
+        work[176][lane] = 1.0 / 6.0 * (t236 * work[27][lane]);
+        const double t238 = 1.0 / 12.0 * (work[28][lane] * t224) + (2.0 * (work[6][lane] * t235) - work[176][lane]);
+        const double t239 = 0.5 * t214;
+        const double t240 = t223 + (0.5 * t238 + t239);
+        work[135][lane] = work[29][lane] * (work[0][lane] * work[30][lane]);
+        const double t242 = (-0.5) * t190 - t184;
+        const double t243 = 1.0 / 6.0 * (work[20][lane] * t216) + 2.0 * (work[17][lane] * t221);
+        work[133][lane] = t193 * work[10][lane];
+        const double t245 = 2.0 / 3.0 * work[133][lane] + 1.0 / 3.0 * (work[16][lane] * t242) + (work[31][lane] + 2.0 * (work[0][lane] * t213));
+        const double t246 = 0.25 * (t243 - t245);
+        work[177][lane] = 1.0 / 6.0 * (t236 * work[22][lane]);
+        const double t248 = work[32][lane] - work[177][lane] + (1.0 / 12.0 * (work[28][lane] * t227) + 2.0 * (work[4][lane] * t235));
+        const double t249 = 0.5 * (t248 + t245);
+        const double t250 = t246 - t249;
+        const double t251 = coef[2][lane] * (y2 - y1_) + coef[1][lane] * (1.0 / 3.0 * (work[10][lane] * t242) + 1.0 / 3.0 * (work[7][lane] * t202)) + (1.0 / 12.0 * (work[15][lane] * t205) + work[11][lane] * t210) + (1.0 / 12.0 * (work[14][lane] * t206) + work[13][lane] * t208 + coef[0][lane] * (work[2][lane] + work[0][lane] * t240 + work[3][lane] * t250));
+        const double t252 = 4.0 * work[135][lane] - work[1][lane] * t251;
+        const double t253 = work[33][lane] - work[134][lane] + (2.0 * (t192 * work[34][lane]) + work[8][lane] * t240) + (2.0 * (work[10][lane] * t213) + 2.0 * (work[0][lane] * t252));
+        work[202][lane] = 2.0 * work[35][lane];
+        work[201][lane] = 2.0 * (t187 * work[36][lane]);
+        const double t256 = t222 + t238;
+        const double t257 = 0.25 * t256 + 0.25 * ((-0.5) * t238 - t239);
+        work[204][lane] = work[37][lane] * (work[4][lane] * work[38][lane]);
+        work[196][lane] = 0.25 * (coef[2][lane] * work[4][lane]);
+        const double t260 = t243 + t248;
+        const double t261 = t249 - t260;
+        const double t262 = coef[1][lane] * (1.0 / 12.0 * (work[22][lane] * t227) + 1.0 / 12.0 * (work[27][lane] * t224)) + work[26][lane] * t230 + coef[0][lane] * (0.25 * (work[6][lane] * t261) + (work[36][lane] + work[4][lane] * t257));
+        const double t263 = 4.0 * work[204][lane] - work[5][lane] * (work[196][lane] - 1.0 / 48.0 * (work[24][lane] * t228) + (work[21][lane] * t234 - 1.0 / 48.0 * (work[25][lane] * t229)) + t262);
+        const double t264 = 2.0 * (t227 * work[39][lane]) + 2.0 * (work[22][lane] * t235) + (work[202][lane] - work[201][lane]) + (work[9][lane] * t257 + 2.0 * (work[4][lane] * t263));
+        const double t265 = t253 + t264;
+        const double t266 = t246 - t260;
+        const double t267 = t256 + t223;
+        const double t268 = (-1.0 / 24.0) * (t217 * work[40][lane]) - 1.0 / 24.0 * (work[41][lane] * t218) + ((-1.0 / 24.0) * (work[42][lane] * t219) - 1.0 / 24.0 * (work[43][lane] * t220)) + (coef[1][lane] * (1.0 / 6.0 * (t216 * work[44][lane]) + 1.0 / 6.0 * (work[45][lane] * t215)) + coef[0][lane] * (0.5 * (work[17][lane] * t267) + 0.5 * (work[18][lane] * t266)));
+        const double t269 = work[46][lane] * t268;
+        const double t270 = 2.0 * (t215 * work[47][lane]) + 2.0 * (work[45][lane] * t221) + (0.5 * (work[48][lane] * t266) - 2.0 * (work[18][lane] * t269));
+        const double t271 = t270 - (2.0 * (t204 * work[34][lane]) - 2.0 * (t181 * work[49][lane]) + (2.0 * (work[7][lane] * t213) + work[8][lane] * t250) + 2.0 * (work[3][lane] * t252));
+        const double t272 = (-0.5) * t271;
+        const double t273 = 2.0 * (t216 * work[47][lane]) + 2.0 * (work[44][lane] * t221) + (0.5 * (work[48][lane] * t267) - 2.0 * (work[17][lane] * t269));
+        const double t274 = t273 - t253;
+        const double t275 = 2.0 * (t224 * work[39][lane]) - 0.5 * (t187 * work[50][lane]) + (2.0 * (work[27][lane] * t235) + 0.25 * (work[9][lane] * t261)) + 2.0 * (work[6][lane] * t263) + t270;
+        const double t276 = t273 + t264;
+        work[138][lane] = 2.0 * (work[51][lane] * work[49][lane]);
+        const double t278 = 2.0 * (work[7][lane] * work[52][lane]) - work[138][lane] + (2.0 * (work[53][lane] * work[34][lane]) + work[33][lane]) + (work[8][lane] * work[54][lane] + 2.0 * (work[3][lane] * work[55][lane]));
+        work[210][lane] = 0.5 * (work[56][lane] * work[50][lane]);
+        const double t280 = 2.0 * (work[57][lane] * work[39][lane]) + 2.0 * (work[27][lane] * work[58][lane]) + (work[202][lane] - work[210][lane]) + (0.25 * (work[9][lane] * work[59][lane]) + 2.0 * (work[6][lane] * work[60][lane]));
+        const double t281 = t278 + t280;
+        const double t282 = work[61][lane] - work[62][lane];
+        const double t283 = work[63][lane] + work[64][lane];
+        const double t284 = (-1.0 / 24.0) * (work[65][lane] * work[40][lane]) - 1.0 / 24.0 * (work[41][lane] * work[66][lane]) + ((-1.0 / 24.0) * (work[42][lane] * work[67][lane]) - 1.0 / 24.0 * (work[43][lane] * work[68][lane])) + (coef[1][lane] * (1.0 / 6.0 * (work[69][lane] * work[45][lane]) + 1.0 / 6.0 * (work[44][lane] * work[70][lane])) + coef[0][lane] * (0.5 * (work[18][lane] * t282) + 0.5 * (work[17][lane] * t283)));
+        const double t285 = work[46][lane] * t284;
+        const double t286 = 2.0 * (work[69][lane] * work[47][lane]) + 2.0 * (work[45][lane] * work[71][lane]) + (0.5 * (work[48][lane] * t282) - 2.0 * (work[18][lane] * t285));
+        const double t287 = t286 - t278;
+        const double t288 = 2.0 * (work[70][lane] * work[47][lane]) + 2.0 * (work[44][lane] * work[71][lane]) + (0.5 * (work[48][lane] * t283) - 2.0 * (work[17][lane] * t285));
+        const double t289 = t288 - work[72][lane];
+        const double t290 = 0.5 * t289;
+        const double t291 = t286 + t280;
+        const double t292 = work[73][lane] + t288;
+        const double t293 = work[18][lane] * work[46][lane];
+        work[136][lane] = coef[0][lane] * t293;
+        const double t295 = work[18][lane] * work[136][lane];
+        work[120][lane] = 0.5 * work[48][lane];
+        work[145][lane] = t295 - work[120][lane];
+        work[146][lane] = work[120][lane] - t295;
+        work[90][lane] = 0.25 * (work[146][lane] + work[74][lane]);
+        work[88][lane] = work[145][lane] + work[90][lane];
+        work[105][lane] = work[136][lane] * work[75][lane];
+        work[151][lane] = t293 * work[41][lane];
+        work[150][lane] = 2.0 * work[45][lane];
+        work[148][lane] = work[17][lane] * work[136][lane];
+        work[97][lane] = 0.25 * (work[148][lane] - work[76][lane]) - work[148][lane];
+        work[99][lane] = work[150][lane] + (2.0 * (work[18][lane] * work[97][lane]) + 2.0 * (work[17][lane] * work[88][lane]));
+        work[101][lane] = coef[1][lane] * work[99][lane];
+        work[100][lane] = 1.0 / 12.0 * work[151][lane] - 1.0 / 24.0 * (work[19][lane] * work[101][lane]);
+        work[154][lane] = 1.0 / 12.0 * (t293 * work[40][lane]);
+        work[153][lane] = 1.0 / 12.0 * (t293 * work[42][lane]);
+        work[152][lane] = 1.0 / 12.0 * (t293 * work[43][lane]);
+        work[98][lane] = work[152][lane] - 1.0 / 24.0 * (work[19][lane] * work[99][lane]);
+        work[89][lane] = work[19][lane] * work[100][lane] + (work[154][lane] + coef[1][lane] * (work[153][lane] + work[19][lane] * work[98][lane]));
+        work[144][lane] = work[77][lane] - work[148][lane];
+        work[91][lane] = 0.5 * work[78][lane];
+        work[94][lane] = work[145][lane] + work[91][lane];
+        work[140][lane] = 2.0 * (work[6][lane] * work[144][lane]) + 2.0 * (work[4][lane] * work[94][lane]);
+        work[141][lane] = work[23][lane] * work[140][lane];
+        work[142][lane] = coef[1][lane] * work[140][lane];
+        work[143][lane] = work[23][lane] * work[142][lane];
+        work[95][lane] = (-1.0 / 48.0) * (coef[1][lane] * (work[23][lane] * work[141][lane])) - 1.0 / 48.0 * (work[23][lane] * work[143][lane]);
+        work[107][lane] = 1.0 / 12.0 * (work[28][lane] * work[144][lane]) + 2.0 * (work[6][lane] * work[95][lane]);
+        work[87][lane] = coef[1][lane] * t293;
+        work[163][lane] = 1.0 / 3.0 * (work[87][lane] * work[45][lane]);
+        work[132][lane] = 2.0 * work[47][lane];
+        const double t326 = 1.0 / 6.0 * (work[20][lane] * work[97][lane]) - work[163][lane] + (work[132][lane] + 2.0 * (work[18][lane] * work[89][lane]));
+        work[139][lane] = work[107][lane] + t326;
+        const double t328 = work[76][lane] - work[148][lane];
+        work[109][lane] = (-0.25) * t328 - work[77][lane];
+        work[117][lane] = work[91][lane] - work[90][lane];
+        work[137][lane] = work[77][lane] + 0.25 * t328;
+        work[114][lane] = 2.0 * (work[0][lane] * work[117][lane]) + (2.0 * (work[3][lane] * work[137][lane]) - work[79][lane]);
+        work[115][lane] = coef[1][lane] * work[114][lane];
+        work[110][lane] = work[80][lane] + 1.0 / 12.0 * (work[12][lane] * work[115][lane]);
+        work[116][lane] = work[81][lane] + 1.0 / 12.0 * (work[12][lane] * work[114][lane]);
+        work[92][lane] = work[12][lane] * work[110][lane] + (work[82][lane] + coef[1][lane] * (work[83][lane] + work[12][lane] * work[116][lane]));
+        work[106][lane] = (-2.0 / 3.0) * work[84][lane] - work[31][lane] + (1.0 / 3.0 * (work[16][lane] * work[109][lane]) + 2.0 * (work[3][lane] * work[92][lane]));
+        work[108][lane] = 0.25 * work[106][lane] - 0.25 * t326;
+        work[102][lane] = work[139][lane] + work[108][lane];
+        work[131][lane] = work[19][lane] * work[46][lane];
+        work[104][lane] = work[131][lane] * (work[18][lane] * work[85][lane]);
+        work[96][lane] = 0.5 * (coef[2][lane] * work[18][lane]);
+        work[103][lane] = 0.5 * work[86][lane];
+        jacobian[1][lane] = (-0.5) * t265;
+        increment_jacobian[1][lane] = t265;
+        jacobian[19][lane] = 0.25 * t271;
+        increment_jacobian[2][lane] = t271;
+        jacobian[2][lane] = t272;
+        increment_jacobian[19][lane] = t272;
+        jacobian[3][lane] = (-0.5) * t274;
+        jacobian[13][lane] = (-0.25) * t274;
+        increment_jacobian[3][lane] = t274;
+        increment_jacobian[13][lane] = 0.5 * t274;
+        jacobian[4][lane] = 0.5 * t275;
+        jacobian[31][lane] = t275;
+        increment_jacobian[4][lane] = -t275;
+        increment_jacobian[31][lane] = (-2.0) * t275;
+        jacobian[5][lane] = 0.5 * t276;
+        jacobian[25][lane] = -t276;
+        increment_jacobian[5][lane] = -t276;
+        increment_jacobian[25][lane] = 2.0 * t276;
+        jacobian[6][lane] = 0.5 * t281;
+        increment_jacobian[6][lane] = -t281;
+        increment_jacobian[8][lane] = t278 - t286;
+        jacobian[8][lane] = 0.5 * t287;
+        jacobian[18][lane] = 0.25 * t287;
+        increment_jacobian[18][lane] = (-0.5) * t287;
+        increment_jacobian[9][lane] = work[72][lane] - t288;
+        jacobian[12][lane] = (-0.25) * t289;
+        jacobian[9][lane] = t290;
+        increment_jacobian[12][lane] = t290;
+        jacobian[10][lane] = (-0.5) * t291;
+        jacobian[30][lane] = t291;
+        increment_jacobian[10][lane] = t291;
+        increment_jacobian[30][lane] = (-2.0) * t291;
+        jacobian[11][lane] = (-0.5) * t292;
+        jacobian[24][lane] = -t292;
+        increment_jacobian[11][lane] = t292;
+        increment_jacobian[24][lane] = 2.0 * t292;
+    }
+}
+
+/* vortices3_linearise_lanes_part3 (part 3 of 4) */
+vortices3_APART static void vortices3_linearise_lanes_part3(vortices3_lanes coef[restrict 3],
+                                                            vortices3_lanes y[restrict 6],
+                                                            vortices3_lanes displacement[restrict 6],
+                                                            vortices3_lanes increment[restrict 6],
+                                                            vortices3_lanes jacobian[restrict 36],
+                                                            vortices3_lanes increment_jacobian[restrict 36],
+                                                            vortices3_lanes work[restrict 218])
+{
+    (void)y;
+    (void)displacement;
+    (void)increment;
+    vortices3_EACH_LANE
+    for (int lane = 0; lane < vortices3_LANES; ++lane) {
+        const double t344 = 1.0 / 3.0 * (work[87][lane] * work[44][lane]);
+        const double t345 = 1.0 / 6.0 * (work[20][lane] * work[88][lane]) - t344 + 2.0 * (work[17][lane] * work[89][lane]);
+        const double t346 = work[90][lane] - work[91][lane];
+        const double t347 = 1.0 / 3.0 * (work[16][lane] * t346) + (2.0 * (work[0][lane] * work[92][lane]) - work[93][lane]);
+        const double t348 = 0.25 * (t345 - t347);
+        const double t349 = 1.0 / 12.0 * (work[28][lane] * work[94][lane]) + 2.0 * (work[4][lane] * work[95][lane]);
+        const double t350 = t349 + t345;
+        const double t351 = t348 - t350;
+        const double t352 = work[96][lane] + coef[1][lane] * (1.0 / 6.0 * (work[45][lane] * work[97][lane]) + 1.0 / 6.0 * (work[44][lane] * work[88][lane])) + (work[41][lane] * work[98][lane] - 1.0 / 24.0 * (work[40][lane] * work[99][lane])) + (work[43][lane] * work[100][lane] - 1.0 / 24.0 * (work[42][lane] * work[101][lane]) + coef[0][lane] * (0.5 * (work[17][lane] * work[102][lane]) + (work[103][lane] + 0.5 * (work[18][lane] * t351))));
+        const double t353 = 4.0 * work[104][lane] - work[46][lane] * t352;
+        const double t354 = 2.0 * (work[88][lane] * work[47][lane]) - work[105][lane] + (2.0 * (work[44][lane] * work[89][lane]) + 0.5 * (work[48][lane] * work[102][lane])) + 2.0 * (work[17][lane] * t353);
+        const double t355 = 0.5 * work[106][lane];
+        const double t356 = 0.5 * work[107][lane] + t355 + work[108][lane];
+        const double t357 = 0.5 * (t349 + t347);
+        const double t358 = t348 - t357;
+        const double t359 = coef[1][lane] * (1.0 / 3.0 * (work[7][lane] * work[109][lane]) + 1.0 / 3.0 * (work[10][lane] * t346)) + work[13][lane] * work[110][lane] + coef[0][lane] * (work[0][lane] * t356 + (work[111][lane] - work[112][lane] + work[3][lane] * t358));
+        const double t360 = (-4.0) * work[113][lane] - work[1][lane] * (coef[2][lane] * work[3][lane] + 1.0 / 12.0 * (work[114][lane] * work[15][lane]) + (1.0 / 12.0 * (work[14][lane] * work[115][lane]) + work[11][lane] * work[116][lane]) + t359);
+        const double t361 = t354 - (2.0 * (work[117][lane] * work[34][lane]) + work[118][lane] + (2.0 * (work[10][lane] * work[92][lane]) + work[8][lane] * t356) + 2.0 * (work[0][lane] * t360));
+        const double t362 = 0.25 * t361;
+        const double t363 = work[17][lane] * work[46][lane];
+        const double t364 = coef[0][lane] * t363;
+        const double t365 = work[18][lane] * t364;
+        const double t366 = work[119][lane] - t365;
+        const double t367 = 0.25 * t366;
+        const double t368 = t365 + t367;
+        const double t369 = work[17][lane] * t364;
+        const double t370 = work[120][lane] - t369;
+        const double t371 = t370 + 0.5 * work[121][lane];
+        const double t372 = t365 - work[122][lane];
+        const double t373 = 2.0 * (work[4][lane] * t372) + 2.0 * (work[6][lane] * t371);
+        const double t374 = work[23][lane] * t373;
+        const double t375 = coef[1][lane] * t373;
+        const double t376 = work[23][lane] * t375;
+        const double t377 = (-1.0 / 48.0) * (coef[1][lane] * (work[23][lane] * t374)) - 1.0 / 48.0 * (work[23][lane] * t376);
+        const double t378 = 1.0 / 12.0 * (work[28][lane] * t371) + 2.0 * (work[6][lane] * t377);
+        const double t379 = 0.25 * (t370 + work[121][lane]);
+        const double t380 = t370 - t379;
+        const double t381 = coef[1][lane] * t363;
+        const double t382 = 1.0 / 3.0 * (t381 * work[45][lane]);
+        const double t383 = t363 * work[41][lane];
+        const double t384 = 2.0 * work[44][lane];
+        const double t385 = t384 + (2.0 * (work[17][lane] * t368) + 2.0 * (work[18][lane] * t380));
+        const double t386 = coef[1][lane] * t385;
+        const double t387 = 1.0 / 12.0 * t383 - 1.0 / 24.0 * (work[19][lane] * t386);
+        const double t388 = 1.0 / 12.0 * (t363 * work[40][lane]);
+        const double t389 = 1.0 / 12.0 * (t363 * work[42][lane]);
+        const double t390 = t363 * work[43][lane];
+        const double t391 = 1.0 / 12.0 * t390 - 1.0 / 24.0 * (work[19][lane] * t385);
+        const double t392 = work[19][lane] * t387 + (t388 + coef[1][lane] * (t389 + work[19][lane] * t391));
+        const double t393 = 1.0 / 6.0 * (work[20][lane] * t380) - t382 + 2.0 * (work[18][lane] * t392);
+        const double t394 = t378 + t393;
+        const double t395 = 0.5 * work[123][lane];
+        const double t396 = t395 - t379;
+        const double t397 = (-0.25) * t366 - work[122][lane];
+        const double t398 = 2.0 * (work[0][lane] * t397) - work[124][lane] + 2.0 * (work[3][lane] * (t379 - t395));
+        const double t399 = coef[1][lane] * t398;
+        const double t400 = work[125][lane] + 1.0 / 12.0 * (work[12][lane] * t399);
+        const double t401 = work[126][lane] + 1.0 / 12.0 * (work[12][lane] * t398);
+        const double t402 = work[12][lane] * t400 + (work[127][lane] + coef[1][lane] * (work[128][lane] + work[12][lane] * t401));
+        const double t403 = 1.0 / 3.0 * (work[16][lane] * t396) - work[129][lane] + 2.0 * (work[3][lane] * t402);
+        const double t404 = 0.25 * t403 - 0.25 * t393;
+        const double t405 = t394 + t404;
+        work[207][lane] = 2.0 * work[130][lane];
+        work[206][lane] = t364 * work[75][lane];
+        work[186][lane] = work[131][lane] * (work[17][lane] * work[85][lane]);
+        work[187][lane] = coef[2][lane] * work[17][lane];
+        work[185][lane] = 0.5 * work[75][lane];
+        const double t411 = 1.0 / 3.0 * (t381 * work[44][lane]);
+        const double t412 = 1.0 / 6.0 * (work[20][lane] * t368) - t411 + (work[132][lane] + 2.0 * (work[17][lane] * t392));
+        const double t413 = work[122][lane] + t367;
+        const double t414 = (-2.0 / 3.0) * work[133][lane] - work[31][lane] + (1.0 / 3.0 * (work[16][lane] * t413) + 2.0 * (work[0][lane] * t402));
+        const double t415 = 0.25 * (t412 - t414);
+        const double t416 = 1.0 / 12.0 * (work[28][lane] * t372) + 2.0 * (work[4][lane] * t377);
+        const double t417 = t416 + t412;
+        const double t418 = t415 - t417;
+        const double t419 = 0.5 * work[187][lane] + coef[1][lane] * (1.0 / 6.0 * (work[44][lane] * t368) + 1.0 / 6.0 * (work[45][lane] * t380)) + (work[41][lane] * t391 - 1.0 / 24.0 * (work[40][lane] * t385)) + (work[43][lane] * t387 - 1.0 / 24.0 * (work[42][lane] * t386) + coef[0][lane] * (work[185][lane] + 0.5 * (work[17][lane] * t405) + 0.5 * (work[18][lane] * t418)));
+        const double t420 = 4.0 * work[186][lane] - work[46][lane] * t419;
+        const double t421 = 2.0 * (t368 * work[47][lane]) + 0.5 * (work[48][lane] * t405) + (work[207][lane] - work[206][lane]) + (2.0 * (work[44][lane] * t392) + 2.0 * (work[17][lane] * t420));
+        const double t422 = 0.5 * t378;
+        const double t423 = t422 + 0.5 * t403 + t404;
+        const double t424 = 0.5 * (t416 + t414);
+        const double t425 = coef[2][lane] * work[0][lane] + coef[1][lane] * (1.0 / 3.0 * (work[10][lane] * t413) + 1.0 / 3.0 * (work[7][lane] * t396)) + (1.0 / 12.0 * (work[15][lane] * t398) + work[11][lane] * t401) + (1.0 / 12.0 * (work[14][lane] * t399) + work[13][lane] * t400 + coef[0][lane] * (work[3][lane] * (t415 - t424) + (work[0][lane] * t423 - work[2][lane])));
+        const double t426 = 2.0 * (t397 * work[34][lane]) + 2.0 * (work[10][lane] * t402) + (work[134][lane] - work[33][lane]) + (work[8][lane] * t423 + 2.0 * (work[0][lane] * ((-4.0) * work[135][lane] - work[1][lane] * t425)));
+        const double t427 = t421 - t426;
+        const double t428 = t424 - t417;
+        const double t429 = 0.25 * t394 + 0.25 * ((-0.5) * t403 - t422);
+        const double t430 = (-1.0 / 48.0) * (t373 * work[24][lane]) - 1.0 / 48.0 * (work[21][lane] * t374) + ((-1.0 / 48.0) * (work[25][lane] * t375) - 1.0 / 48.0 * (work[26][lane] * t376)) + (coef[1][lane] * (1.0 / 12.0 * (t372 * work[22][lane]) + 1.0 / 12.0 * (work[27][lane] * t371)) + coef[0][lane] * (work[4][lane] * t429 + 0.25 * (work[6][lane] * t428)));
+        const double t431 = work[5][lane] * t430;
+        const double t432 = 2.0 * (t371 * work[39][lane]) + 2.0 * (work[27][lane] * t377) + (0.25 * (work[9][lane] * t428) - 2.0 * (work[6][lane] * t431)) + (2.0 * (t380 * work[47][lane]) - t364 * work[86][lane] + (2.0 * (work[45][lane] * t392) + 0.5 * (work[48][lane] * t418)) + 2.0 * (work[18][lane] * t420));
+        const double t433 = 2.0 * (t372 * work[39][lane]) + 2.0 * (work[22][lane] * t377) + (work[9][lane] * t429 - 2.0 * (work[4][lane] * t431)) + t421;
+        work[213][lane] = work[136][lane] * work[86][lane];
+        const double t435 = 2.0 * (work[45][lane] * work[89][lane]) - work[213][lane] + (2.0 * (work[97][lane] * work[47][lane]) + work[207][lane]) + (0.5 * (work[48][lane] * t351) + 2.0 * (work[18][lane] * t353));
+        const double t436 = t435 - (2.0 * (work[137][lane] * work[34][lane]) + 2.0 * (work[7][lane] * work[92][lane]) + (work[138][lane] - work[33][lane]) + (work[8][lane] * t358 + 2.0 * (work[3][lane] * t360)));
+        const double t437 = t357 - t350;
+        const double t438 = 0.25 * work[139][lane] + 0.25 * ((-0.5) * work[107][lane] - t355);
+        const double t439 = (-1.0 / 48.0) * (work[140][lane] * work[24][lane]) - 1.0 / 48.0 * (work[21][lane] * work[141][lane]) + ((-1.0 / 48.0) * (work[25][lane] * work[142][lane]) - 1.0 / 48.0 * (work[26][lane] * work[143][lane])) + (coef[1][lane] * (1.0 / 12.0 * (work[144][lane] * work[27][lane]) + 1.0 / 12.0 * (work[22][lane] * work[94][lane])) + coef[0][lane] * (0.25 * (work[6][lane] * t437) + work[4][lane] * t438));
+        const double t440 = work[5][lane] * t439;
+        const double t441 = 2.0 * (work[144][lane] * work[39][lane]) + 2.0 * (work[27][lane] * work[95][lane]) + (0.25 * (work[9][lane] * t437) - 2.0 * (work[6][lane] * t440)) + t435;
+        const double t442 = 2.0 * (work[94][lane] * work[39][lane]) + 2.0 * (work[22][lane] * work[95][lane]) + (work[9][lane] * t438 - 2.0 * (work[4][lane] * t440)) + t354;
+        const double t443 = 0.25 * work[145][lane];
+        const double t444 = work[146][lane] + work[147][lane];
+        const double t445 = t443 + t444;
+        const double t446 = work[148][lane] + work[149][lane];
+        const double t447 = 0.25 * work[148][lane];
+        work[215][lane] = t446 - t447;
+        const double t449 = 2.0 * (work[18][lane] * work[215][lane]) + 2.0 * (work[17][lane] * t445);
+        const double t450 = coef[1][lane] * (t449 - work[150][lane]);
+        const double t451 = (-1.0 / 12.0) * work[151][lane] - 1.0 / 24.0 * (work[19][lane] * t450);
+        const double t452 = work[150][lane] - t449;
+        const double t453 = 1.0 / 24.0 * (work[19][lane] * t452) - work[152][lane];
+        work[214][lane] = work[19][lane] * t451 + (coef[1][lane] * (work[19][lane] * t453 - work[153][lane]) - work[154][lane]);
+        const double t455 = 0.25 * work[155][lane];
+        work[208][lane] = t446 - t455;
+        const double t457 = 0.5 * work[156][lane];
+        const double t458 = t444 + t457;
+        const double t459 = 2.0 * (work[6][lane] * work[208][lane]) - work[157][lane] + 2.0 * (work[4][lane] * t458);
+        const double t460 = coef[1][lane] * t459;
+        const double t461 = (-1.0 / 24.0) * work[158][lane] - 1.0 / 48.0 * (work[23][lane] * t460);
+        const double t462 = (-1.0 / 24.0) * work[159][lane] - 1.0 / 48.0 * (work[23][lane] * t459);
+        work[209][lane] = work[23][lane] * t461 + (coef[1][lane] * (work[23][lane] * t462 - work[160][lane]) - work[161][lane]);
+        const double t464 = work[162][lane] - work[32][lane] + (1.0 / 12.0 * (work[28][lane] * work[208][lane]) + 2.0 * (work[6][lane] * work[209][lane]));
+        const double t465 = 1.0 / 6.0 * (work[20][lane] * work[215][lane]) + work[163][lane] + (2.0 * (work[18][lane] * work[214][lane]) - work[132][lane]);
+        const double t466 = t464 + t465;
+        const double t467 = 2.0 * (work[3][lane] * (t447 - t455)) + 2.0 * (work[0][lane] * (t457 - t443));
+        const double t468 = 1.0 / 12.0 * (work[12][lane] * (work[12][lane] * (coef[1][lane] * t467))) + 1.0 / 12.0 * (coef[1][lane] * (work[12][lane] * (work[12][lane] * t467)));
+        const double t469 = 1.0 / 3.0 * (work[16][lane] * (t455 - t447)) + 2.0 * (work[3][lane] * t468);
+        const double t470 = t466 + (0.25 * t469 - 0.25 * t465);
+        const double t471 = t344 + 1.0 / 6.0 * (work[20][lane] * t445) + 2.0 * (work[17][lane] * work[214][lane]);
+        const double t472 = 1.0 / 3.0 * (work[16][lane] * (t443 - t457)) + 2.0 * (work[0][lane] * t468);
+        const double t473 = 1.0 / 12.0 * (work[28][lane] * t458) + (work[164][lane] + 2.0 * (work[4][lane] * work[209][lane]));
+        const double t474 = t471 + t473;
+        work[216][lane] = 0.25 * (t471 - t472) - t474;
+        const double t476 = coef[1][lane] * (1.0 / 6.0 * (work[45][lane] * work[215][lane]) + 1.0 / 6.0 * (work[44][lane] * t445)) - work[96][lane] + (1.0 / 24.0 * (work[40][lane] * t452) + work[41][lane] * t453) + (work[43][lane] * t451 - 1.0 / 24.0 * (work[42][lane] * t450) + coef[0][lane] * (0.5 * (work[18][lane] * work[216][lane]) - work[103][lane] + 0.5 * (work[17][lane] * t470)));
+        work[217][lane] = (-4.0) * work[104][lane] - work[46][lane] * t476;
+        const double t478 = 0.25 * t466 + 0.25 * ((-0.5) * t464 - 0.5 * t469);
+        work[211][lane] = 0.5 * (t472 + t473) - t474;
+        const double t480 = coef[1][lane] * (1.0 / 12.0 * (work[208][lane] * work[27][lane]) + 1.0 / 12.0 * (work[22][lane] * t458)) + work[26][lane] * t461 + coef[0][lane] * (work[4][lane] * t478 + (0.25 * (work[6][lane] * work[211][lane]) - work[165][lane]));
+        work[212][lane] = (-4.0) * work[166][lane] - work[5][lane] * ((-0.25) * work[167][lane] - 1.0 / 48.0 * (t459 * work[24][lane]) + (work[21][lane] * t462 - 1.0 / 48.0 * (work[25][lane] * t460)) + t480);
+        const double t482 = 2.0 * (t445 * work[47][lane]) + work[105][lane] + (2.0 * (work[44][lane] * work[214][lane]) + 0.5 * (work[48][lane] * t470)) + 2.0 * (work[17][lane] * work[217][lane]) + (2.0 * (t458 * work[39][lane]) + work[168][lane] + (2.0 * (work[22][lane] * work[209][lane]) + work[9][lane] * t478) + 2.0 * (work[4][lane] * work[212][lane]));
+        const double t483 = 0.25 * t365;
+        const double t484 = (-0.5) * work[169][lane] - t365;
+        work[180][lane] = t483 + t484;
+        const double t486 = t369 - work[120][lane];
+        const double t487 = work[170][lane] - work[9][lane];
+        const double t488 = t486 + 0.25 * t487;
+        work[181][lane] = 0.25 * t370 + t488;
+        work[188][lane] = 2.0 * (work[17][lane] * work[180][lane]) - t384 + 2.0 * (work[18][lane] * work[181][lane]);
+        work[190][lane] = coef[1][lane] * work[188][lane];
+        work[182][lane] = (-1.0 / 12.0) * t383 - 1.0 / 24.0 * (work[19][lane] * work[190][lane]);
+        work[189][lane] = (-1.0 / 12.0) * t390 - 1.0 / 24.0 * (work[19][lane] * work[188][lane]);
+        work[205][lane] = work[19][lane] * work[182][lane] + (coef[1][lane] * (work[19][lane] * work[189][lane] - t389) - t388);
+        const double t495 = 1.0 / 6.0 * (work[20][lane] * work[181][lane]) + (t382 + 2.0 * (work[18][lane] * work[205][lane]));
+        const double t496 = 0.125 * t487;
+        work[195][lane] = t488 - t496;
+        const double t498 = 0.25 * work[169][lane];
+        work[194][lane] = t498 + t484;
+        const double t500 = 2.0 * (work[4][lane] * work[194][lane]) + 2.0 * (work[6][lane] * work[195][lane]);
+        work[200][lane] = coef[1][lane] * (t500 - work[171][lane]);
+        work[199][lane] = (-1.0 / 24.0) * work[172][lane] - 1.0 / 48.0 * (work[23][lane] * work[200][lane]);
+        work[197][lane] = work[171][lane] - t500;
+        work[198][lane] = 1.0 / 48.0 * (work[23][lane] * work[197][lane]) - work[173][lane];
+        work[203][lane] = work[23][lane] * work[199][lane] + (coef[1][lane] * (work[23][lane] * work[198][lane] - work[174][lane]) - work[175][lane]);
+        work[193][lane] = work[176][lane] + 1.0 / 12.0 * (work[28][lane] * work[195][lane]) + 2.0 * (work[6][lane] * work[203][lane]);
+        work[191][lane] = t495 + work[193][lane];
+        const double t508 = 0.25 * t486;
+        const double t509 = 2.0 * (work[0][lane] * (t498 - t483)) + 2.0 * (work[3][lane] * (t508 - t496));
+        const double t510 = 1.0 / 12.0 * (coef[1][lane] * (work[12][lane] * (work[12][lane] * t509))) + 1.0 / 12.0 * (work[12][lane] * (work[12][lane] * (coef[1][lane] * t509)));
+        work[192][lane] = 1.0 / 3.0 * (work[16][lane] * (t496 - t508)) + 2.0 * (work[3][lane] * t510);
+        work[184][lane] = work[191][lane] + (0.25 * work[192][lane] - 0.25 * t495);
+        work[178][lane] = t411 - work[132][lane] + (1.0 / 6.0 * (work[20][lane] * work[180][lane]) + 2.0 * (work[17][lane] * work[205][lane]));
+        work[183][lane] = 1.0 / 3.0 * (work[16][lane] * (t483 - t498)) + 2.0 * (work[0][lane] * t510);
+        work[179][lane] = work[177][lane] + 1.0 / 12.0 * (work[28][lane] * work[194][lane]) + (2.0 * (work[4][lane] * work[203][lane]) - work[32][lane]);
+        increment_jacobian[14][lane] = 0.5 * t361;
+        increment_jacobian[21][lane] = (-0.5) * t361;
+        jacobian[14][lane] = 1.0 - t362;
+        jacobian[21][lane] = 1.0 + t362;
+        jacobian[15][lane] = (-0.25) * t427;
+        increment_jacobian[15][lane] = 0.5 * t427;
+        jacobian[16][lane] = 0.25 * t432;
+        jacobian[33][lane] = t432;
+        increment_jacobian[16][lane] = (-0.5) * t432;
+        increment_jacobian[33][lane] = (-2.0) * t432;
+        jacobian[17][lane] = 0.25 * t433;
+        jacobian[27][lane] = -t433;
+        increment_jacobian[17][lane] = (-0.5) * t433;
+        increment_jacobian[27][lane] = 2.0 * t433;
+        jacobian[20][lane] = 0.25 * t436;
+        increment_jacobian[20][lane] = (-0.5) * t436;
+        jacobian[22][lane] = (-0.25) * t441;
+        jacobian[32][lane] = t441;
+        increment_jacobian[22][lane] = 0.5 * t441;
+        increment_jacobian[32][lane] = (-2.0) * t441;
+        jacobian[23][lane] = (-0.25) * t442;
+        jacobian[26][lane] = -t442;
+        increment_jacobian[23][lane] = 0.5 * t442;
+        increment_jacobian[26][lane] = 2.0 * t442;
+        jacobian[28][lane] = 1.0 - t482;
+        jacobian[35][lane] = 1.0 + t482;
+        increment_jacobian[28][lane] = 2.0 * t482;
+        increment_jacobian[35][lane] = (-2.0) * t482;
+    }
+}
+
+/* vortices3_linearise_lanes_part4 (part 4 of 4) */
+vortices3_APART static void vortices3_linearise_lanes_part4(vortices3_lanes coef[restrict 3],
+                                                            vortices3_lanes y[restrict 6],
+                                                            vortices3_lanes displacement[restrict 6],
+                                                            vortices3_lanes increment[restrict 6],
+                                                            vortices3_lanes jacobian[restrict 36],
+                                                            vortices3_lanes increment_jacobian[restrict 36],
+                                                            vortices3_lanes work[restrict 218])
+{
+    (void)y;
+    (void)displacement;
+    (void)increment;
+    vortices3_EACH_LANE
+    for (int lane = 0; lane < vortices3_LANES; ++lane) {
+        const double t516 = work[178][lane] + work[179][lane];
+        const double t517 = coef[1][lane] * (1.0 / 6.0 * (work[180][lane] * work[44][lane]) + 1.0 / 6.0 * (work[45][lane] * work[181][lane])) + work[43][lane] * work[182][lane] + coef[0][lane] * (0.5 * (work[18][lane] * (0.25 * (work[178][lane] - work[183][lane]) - t516)) + (0.5 * (work[17][lane] * work[184][lane]) - work[185][lane]));
+        const double t518 = 2.0 * (work[17][lane] * ((-4.0) * work[186][lane] - work[46][lane] * ((-0.5) * work[187][lane] - 1.0 / 24.0 * (work[188][lane] * work[40][lane]) + (work[41][lane] * work[189][lane] - 1.0 / 24.0 * (work[42][lane] * work[190][lane])) + t517)));
+        const double t519 = 0.25 * work[191][lane] + 0.25 * ((-0.5) * work[192][lane] - 0.5 * work[193][lane]);
+        const double t520 = coef[1][lane] * (1.0 / 12.0 * (work[194][lane] * work[22][lane]) + 1.0 / 12.0 * (work[27][lane] * work[195][lane])) - work[196][lane] + (1.0 / 48.0 * (work[24][lane] * work[197][lane]) + work[21][lane] * work[198][lane]) + (work[26][lane] * work[199][lane] - 1.0 / 48.0 * (work[25][lane] * work[200][lane]) + coef[0][lane] * (work[4][lane] * t519 - work[36][lane] + 0.25 * (work[6][lane] * (0.5 * (work[183][lane] + work[179][lane]) - t516))));
+        const double t521 = 2.0 * (work[194][lane] * work[39][lane]) + work[9][lane] * t519 + (work[201][lane] - work[202][lane]) + (2.0 * (work[22][lane] * work[203][lane]) + 2.0 * (work[4][lane] * ((-4.0) * work[204][lane] - work[5][lane] * t520)));
+        const double t522 = 2.0 * (work[180][lane] * work[47][lane]) + 2.0 * (work[44][lane] * work[205][lane]) + (work[206][lane] - work[207][lane]) + (0.5 * (work[48][lane] * work[184][lane]) + t518) + t521;
+        const double t523 = 2.0 * (work[208][lane] * work[39][lane]) + 2.0 * (work[27][lane] * work[209][lane]) + (work[210][lane] - work[202][lane]) + (0.25 * (work[9][lane] * work[211][lane]) + 2.0 * (work[6][lane] * work[212][lane])) + (work[213][lane] + 2.0 * (work[45][lane] * work[214][lane]) + (2.0 * (work[215][lane] * work[47][lane]) - work[207][lane]) + (0.5 * (work[48][lane] * work[216][lane]) + 2.0 * (work[18][lane] * work[217][lane])));
+        jacobian[29][lane] = -t522;
+        increment_jacobian[29][lane] = 2.0 * t522;
+        jacobian[34][lane] = t523;
+        increment_jacobian[34][lane] = (-2.0) * t523;
+    }
+}
+
+/* vortices3_linearise in all lanes. */
+static void vortices3_linearise_lanes(vortices3_lanes coef[restrict 3], vortices3_lanes y[restrict 6],
+                                      vortices3_lanes displacement[restrict 6],
+                                      vortices3_lanes increment[restrict 6],
+                                      vortices3_lanes jacobian[restrict 36],
+                                      vortices3_lanes increment_jacobian[restrict 36])
+{
+    vortices3_lanes work[218];
+    vortices3_linearise_lanes_part1(coef, y, displacement, increment, jacobian, increment_jacobian, work);
+    vortices3_linearise_lanes_part2(coef, y, displacement, increment, jacobian, increment_jacobian, work);
+    vortices3_linearise_lanes_part3(coef, y, displacement, increment, jacobian, increment_jacobian, work);
+    vortices3_linearise_lanes_part4(coef, y, displacement, increment, jacobian, increment_jacobian, work);
+}
+
+/* Invert the matrices of all lanes in place by elimination without pivoting: they are I + O(h). Infinite where a pivot is
+   far from 1. */
+static void vortices3_invert(vortices3_lanes matrix[restrict 36])
+{
+    for (int k = 0; k < 6; ++k) {
+        vortices3_lanes factor[6];
+        vortices3_EACH_LANE
+        for (int lane = 0; lane < vortices3_LANES; ++lane) {
+            const double reciprocal = 1.0 / matrix[k * 6 + k][lane];
+            matrix[k * 6 + k][lane] = 1.0;
+            for (int j = 0; j < 6; ++j) matrix[k * 6 + j][lane] *= reciprocal;
+            matrix[k * 6 + k][lane] += fabs(reciprocal) < 1e3 ? 0.0 : HUGE_VAL;
+        }
+        for (int i = 0; i < 6; ++i) {
+            vortices3_EACH_LANE
+            for (int lane = 0; lane < vortices3_LANES; ++lane) {
+                factor[i][lane] = matrix[i * 6 + k][lane];
+                if (i != k) matrix[i * 6 + k][lane] = 0.0;
+            }
+        }
+        for (int i = 0; i < 6; ++i)
+            for (int j = 0; j < 6 && i != k; ++j) {
+                vortices3_EACH_LANE
+                for (int lane = 0; lane < vortices3_LANES; ++lane)
+                    matrix[i * 6 + j][lane] -= factor[i][lane] * matrix[k * 6 + j][lane];
+            }
+    }
+}
+
+/* Everything about a stage at the points y. */
+static void vortices3_tabulate(vortices3_lanes coef[restrict], vortices3_lines *line)
+{
+    vortices3_linearise_lanes(coef, line->y, line->displacement, line->increment, line->inverse, line->slope);
+    vortices3_invert(line->inverse);
+    for (int i = 0; i < 6; ++i)
+        for (int j = 0; j < 6; ++j) {
+            vortices3_lanes sum = { 0.0 };
+            for (int k = 0; k < 6; ++k) {
+                vortices3_EACH_LANE
+                for (int lane = 0; lane < vortices3_LANES; ++lane)
+                    sum[lane] += line->slope[i * 6 + k][lane] * line->inverse[k * 6 + j][lane];
+            }
+            memcpy(line->gain[i * 6 + j], sum, sizeof sum);
+        }
+}
+
+/* vortices3_size in all lanes, summed over the components. */
+static void vortices3_sizes(vortices3_lanes y[restrict 6], vortices3_lanes delta[restrict 6],
+    vortices3_lanes size)
+{
+    vortices3_lanes norm = { 0.0 };
+    memset(size, 0, vortices3_LANES * sizeof size[0]);
+    for (int i = 0; i < 6; ++i)
+        for (int lane = 0; lane < vortices3_LANES; ++lane)
+            norm[lane] = 1e-6 * fabs(y[i][lane]) > norm[lane] ? 1e-6 * fabs(y[i][lane]) : norm[lane];
+    for (int i = 0; i < 6; ++i) {
+        vortices3_EACH_LANE
+        for (int lane = 0; lane < vortices3_LANES; ++lane)
+            size[lane] += fabs(delta[i][lane]) / (fabs(y[i][lane]) + norm[lane] + DBL_MIN);
+    }
+}
+
+/* The steps of a block one after the other, each along the lines of its lane. As X, the state with its carry, gains
+   increment - gain residual, the next residual follows from this one; X itself is added up apart. */
+static void vortices3_chain(vortices3_lines line[1], double x[6], double carry[6])
+{
+    double residual[6], sum[6], small[6];
+    for (int i = 0; i < 6; ++i) {
+        residual[i] = ((line->y[i][0] - x[i]) + line->displacement[i][0]) - carry[i];
+        sum[i] = x[i];
+        small[i] = carry[i];
+    }
+    for (int k = 0; k < 1 * vortices3_LANES; ++k) {
+        const int lane = k / 1, after = (k + 1) / 1 % vortices3_LANES;
+        vortices3_lines *at = &line[k % 1], *next = &line[(k + 1) % 1];
+        double correction[6] = { 0.0 };
+        for (int i = 0; i < 6; ++i) {
+            at->residual[i][lane] = residual[i];
+            for (int j = 0; j < 6; ++j) correction[i] -= at->gain[i * 6 + j][lane] * residual[j];
+        }
+        for (int i = 0; i < 6; ++i) {
+            const double change = at->increment[i][lane], total = sum[i] + change, added = total - sum[i];
+            const double turn = (next->displacement[i][after] - at->displacement[i][lane]) - change;
+            residual[i] = ((next->y[i][after] - at->y[i][lane]) + turn) + (residual[i] - correction[i]);
+            small[i] += ((sum[i] - (total - added)) + (change - added)) + correction[i];
+            sum[i] = total;
+        }
+    }
+    for (int i = 0; i < 6; ++i) {
+        x[i] = sum[i] + small[i];
+        carry[i] = small[i] - (x[i] - sum[i]);
+    }
+}
+
+/* Bring the table up to date. */
+static void vortices3_tell(const vortices3_solver *s, vortices3_table *table)
+{
+    for (int stage = 0; stage < 1; ++stage) {
+        if (table->fits[stage] == s->memory[stage].fits) continue;
+        table->fits[stage] = s->memory[stage].fits;
+        for (int k = 0; k < 3; ++k)
+            for (int lane = 0; lane < vortices3_LANES; ++lane) table->coef[stage][k][lane] = s->coef[stage][k];
+        memcpy(table->weight[stage], s->memory[stage].weight, sizeof table->weight[stage]);
+    }
+}
+
+/* The guesses for the next vortices3_LANES values. */
+static void vortices3_foresee(const vortices3_memory *memory, vortices3_lanes weight[restrict][6],
+    vortices3_lanes y[restrict 6])
+{
+    const int last = memory->count - 1;
+    for (int i = 0; i < 6; ++i) {
+        vortices3_EACH_LANE
+        for (int lane = 0; lane < vortices3_LANES; ++lane) {
+            double even = 0.0, odd = 0.0;
+            for (int k = 0; k < 32; k += 2) {
+                even += weight[k][i][lane] * memory->past[last - k][i];
+                odd += weight[k + 1][i][lane] * memory->past[last - 1 - k][i];
+            }
+            y[i][lane] = even + odd;
+        }
+    }
+}
+
+/* Correct y by the residuals that the chain found. The largest size of a correction; infinite if one is not finite. */
+static double vortices3_correct(vortices3_lines *line)
+{
+    vortices3_lanes size, delta[6];
+    double largest = 0.0, total = 0.0;
+    memset(delta, 0, sizeof delta);
+    for (int i = 0; i < 6; ++i)
+        for (int j = 0; j < 6; ++j) {
+            vortices3_EACH_LANE
+            for (int lane = 0; lane < vortices3_LANES; ++lane)
+                delta[i][lane] += line->inverse[i * 6 + j][lane] * line->residual[j][lane];
+        }
+    vortices3_sizes(line->y, delta, size);
+    for (int i = 0; i < 6; ++i)
+        for (int lane = 0; lane < vortices3_LANES; ++lane) line->y[i][lane] -= delta[i][lane];
+    for (int lane = 0; lane < vortices3_LANES; ++lane) {
+        total += size[lane];
+        largest = size[lane] > largest ? size[lane] : largest;
+    }
+    return isfinite(total) ? largest : HUGE_VAL;
+}
+
+/* vortices3_LANES steps at once: guess the points of all, and correct them together until the error that remains is as
+   small as after a single step. 0, and the solver as before, where that does not come about. */
+static int vortices3_block(vortices3_solver *s, vortices3_table *table)
+{
+    vortices3_lines line[1];
+    double x[6], carry[6], value[6], previous = HUGE_VAL;
+    int passes = 0, solved = 0;
+    for (int stage = 0; stage < 1; ++stage)
+        vortices3_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
+    while (!solved) {
+        double size = 0.0;
+        for (int stage = 0; stage < 1; ++stage) vortices3_tabulate(table->coef[stage], &line[stage]);
+        memcpy(x, s->x, sizeof x);
+        memcpy(carry, s->carry, sizeof carry);
+        vortices3_chain(line, x, carry);
+        for (int stage = 0; stage < 1; ++stage) size = fmax(size, vortices3_correct(&line[stage]));
+        s->evaluations += 1 * vortices3_LANES;
+        const double growth = size / (previous * previous);
+        /* The second test: after the square of so small a correction there is rounding only. */
+        solved = size * size * (growth > 1.0 ? growth : 1.0) <= 1e-20 || (previous < 1e-8 && size < 1e-10);
+        if (++passes == 4 || !(size < previous)) break;
+        previous = size;
+    }
+    for (int i = 0; i < 6; ++i)
+        if (!isfinite(x[i])) return 0;
+    if (!solved) return 0;
+    memcpy(s->x, x, sizeof x);
+    memcpy(s->carry, carry, sizeof carry);
+    s->steps += vortices3_LANES;
+    for (int stage = 0; stage < 1; ++stage) {
+        vortices3_memory *memory = &s->memory[stage];
+        for (int lane = 0; lane < vortices3_LANES; ++lane) {
+            for (int i = 0; i < 6; ++i) value[i] = line[stage].y[i][lane];
+            vortices3_record(memory, value);
+        }
+        memory->slow = passes > 1 ? memory->slow + vortices3_LANES : 0;
+        if (memory->slow > memory->patience) vortices3_fit(memory);
+    }
+    return 1;
+}
+
+/* Whether a block may be tried: not before there are recurrences to guess with, and not for a while after one that
+   failed. They take a thousand steps to repay. */
+static int vortices3_may_block(vortices3_solver *s, double h, size_t steps)
+{
+    int fit = s->setback > 0 && s->steps - s->fitted >= 1000;
+    if (!s->ready || memcmp(&h, &s->h, sizeof h) != 0 || steps < vortices3_LANES) return 0;
+    if (s->pause > 0) {
+        --s->pause;
+        return 0;
+    }
+    for (int stage = 0; stage < 1; ++stage) {
+        fit = fit || s->memory[stage].fits == 0;
+        if (s->memory[stage].count < 96) return 0;
+    }
+    if (fit && steps < 1000) return 0;
+    for (int stage = 0; stage < 1 && fit; ++stage) vortices3_fit(&s->memory[stage]);
+    if (fit) s->fitted = s->steps;
+    return 1;
+}
+
+/* Blocks of steps where the motion can be foreseen, single steps elsewhere: the results differ by round-off only. */
 vortices3_status vortices3_integrate(vortices3_solver *s, double h, size_t steps)
 {
-    for (size_t k = 0; k < steps; ++k) {
+    vortices3_table table;
+    for (int stage = 0; stage < 1; ++stage) table.fits[stage] = -1;
+    while (steps > 0) {
+        if (s != NULL && vortices3_may_block(s, h, steps)) {
+            vortices3_tell(s, &table);
+            if (vortices3_block(s, &table)) {
+                steps -= vortices3_LANES;
+                s->setback /= 2;
+                continue;
+            }
+            s->setback = 2 * s->setback + vortices3_LANES > 1000 ? 1000 : 2 * s->setback + vortices3_LANES;
+            s->pause = s->setback;
+        }
         const vortices3_status status = vortices3_step(s, h);
         if (status != vortices3_OK) return status;
+        --steps;
     }
     return vortices3_OK;
 }

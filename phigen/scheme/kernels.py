@@ -10,7 +10,7 @@ from phigen.realisations.protocol import BiRealisation
 from phigen.scheme.generating import GeneratingFunction
 from phigen.scheme.program import Kernel, Output
 from phigen.scheme.staging import Coefficients
-from phigen.scheme.step import at_momenta, elimination, explicit_increment, explicit_order, linearise
+from phigen.scheme.step import at_momenta, elimination, explicit_increment, explicit_order, inversion, linearise
 from phigen.series.hamilton_jacobi import momentum
 from phigen.symbolic.expression import ONE, ZERO, Expression, number, total
 
@@ -58,7 +58,7 @@ def step_kernels(
             named,
         )
     }
-    return kernels | _elimination_kernel(n)
+    return kernels | _elimination_kernel(n) | _inversion_kernel(n)
 
 
 def _elimination_kernel(n: int) -> dict[str, Kernel]:
@@ -74,6 +74,21 @@ def _elimination_kernel(n: int) -> dict[str, Kernel]:
                 "side": tuple(f"r:{i}" for i in range(n)),
             },
             (Output("solution", tuple(solution)), Output("reciprocal", tuple(reciprocals))),
+        )
+    }
+
+
+def _inversion_kernel(n: int) -> dict[str, Kernel]:
+    if n > UNROLLED:
+        return {}
+    inverse, gain, reciprocals = inversion(n)
+    pairs = [(i, j) for i in range(n) for j in range(n)]
+    return {
+        "invert": Kernel(
+            "invert",
+            "elimination without pivoting: the inverse, the slope times the inverse, the reciprocals of the pivots",
+            {"matrix": tuple(f"J:{i}:{j}" for i, j in pairs), "slope": tuple(f"K:{i}:{j}" for i, j in pairs)},
+            (Output("inverse", tuple(inverse)), Output("gain", tuple(gain)), Output("reciprocal", tuple(reciprocals))),
         )
     }
 

@@ -121,3 +121,20 @@ def elimination(n: int) -> tuple[list[Expression], list[Expression]]:
         rest = total(a[i][j] * solution[j] for j in range(i + 1, n))
         solution[i] = (b[i] - rest) * reciprocals[i]
     return solution, reciprocals
+
+
+def inversion(n: int) -> tuple[list[Expression], list[Expression], list[Expression]]:
+    """J⁻¹ and K J⁻¹ of n×n matrices, row by row, by Gauss–Jordan elimination without pivoting; the reciprocal pivots.
+
+    Symbols ``J:i:j`` and ``K:i:j``. See `elimination` about the pivots.
+    """
+    a = [[symbol(f"J:{i}:{j}") for j in range(n)] for i in range(n)]
+    reciprocals: list[Expression] = []
+    for k in range(n):
+        reciprocals.append(1 / a[k][k])
+        a[k] = [reciprocals[k] if j == k else a[k][j] * reciprocals[k] for j in range(n)]
+        for i in (i for i in range(n) if i != k):
+            factor = a[i][k]
+            a[i] = [-(factor * a[k][j]) if j == k else a[i][j] - factor * a[k][j] for j in range(n)]
+    product = [total(symbol(f"K:{i}:{k}") * a[k][j] for k in range(n)) for i in range(n) for j in range(n)]
+    return [e for row in a for e in row], product, reciprocals

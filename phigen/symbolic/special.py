@@ -25,6 +25,9 @@ NEAR, MIDDLE = 0.25, 16.0
 NEAR_TERMS, MIDDLE_TERMS = 9, 21
 POLE = 4 * math.pi**2
 
+#: Where the plain series with `LANE_TERMS` is used, in code without branches.
+LANE_REACH, LANE_TERMS = 4.0, 17
+
 _PI = Fraction(31415926535897932384626433832795028841971693993751058209749445923078164062862089986, 10**82)
 
 
@@ -48,6 +51,11 @@ def coefficient(order: int, n: int) -> Fraction:
 def near_coefficients(order: int) -> list[float]:
     """Coefficients for |s| < `NEAR`, the constant first; full double precision."""
     return [float(coefficient(order, n)) for n in range(NEAR_TERMS)]
+
+
+def lane_coefficients(order: int) -> list[float]:
+    """Coefficients for |s| ≤ `LANE_REACH`, the constant first; full double precision."""
+    return [float(coefficient(order, n)) for n in range(LANE_TERMS)]
 
 
 @cache

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 
 from phigen.scheme.program import Program
 from phigen.targets import special
-from phigen.targets.c import extras, small, splitting
-from phigen.targets.c.kernels import apart, function, members, printer, wrapped_arguments
+from phigen.targets.c import extras, lanes, small, splitting
+from phigen.targets.c.kernels import LANES, apart, function, members, printer, wrapped_arguments
 from phigen.targets.header import CHECKSUM, checksum, header_lines, plain
 from phigen.targets.path import Syntax, kinds, reads_coefficients, statements
 from phigen.targets.rendering import render
@@ -16,7 +16,7 @@ from phigen.targets.rendering import render
 HISTORY = 8
 
 #: Past values that the fitted recurrence uses, and values that it is fitted to; less where the solver grows too large.
-WINDOW, FITTED, SMALLEST = 16, 80, 30
+WINDOW, FITTED, SMALLEST = 32, 96, 30
 
 #: Values that the history of a solver may hold in all.
 MOST_HISTORY = 8_000
@@ -68,7 +68,7 @@ def _values(program: Program) -> dict[str, object]:
         "fractions": ", ".join(repr(f) for f in program.fractions),
         "terms": TERMS,
         "series": len(program.path.series) if program.path else 0,
-        "remembered": "p" if program.path else "y - x",
+        "remembered": "p" if program.path else "y",
         "coefficients": max(1, program.coefficients),
         "history": HISTORY,
         **_memory_values(program),
@@ -83,14 +83,22 @@ def _values(program: Program) -> dict[str, object]:
         "tolerance": repr(program.tolerance),
         **{f"{key}_signature": "\n".join(lines) for key, lines in _signatures(program).items()},
         "apart": apart(program),
+        **lanes.values(program),
         "pivoting": f"{program.name}_solve" + ("_pivoting" if "eliminate" in program.kernels else ""),
     }
 
 
-def _memory_values(program: Program) -> dict[str, int]:
+def _memory_values(program: Program) -> dict[str, object]:
     affordable = MOST_HISTORY // (2 * program.dimension * len(program.fractions))
     fitted = max(SMALLEST, min(FITTED, affordable))
-    return {"fitted": fitted, "kept": 2 * fitted, "window": 2 * (fitted * WINDOW // FITTED // 2)}
+    ahead = LANES if lanes.blocks(program) else 1
+    return {
+        "fitted": fitted,
+        "kept": 2 * fitted,
+        "window": 2 * (fitted * WINDOW // FITTED // 2),
+        "ahead": ahead,
+        "horizon": "the next values" if ahead > 1 else "the next value",
+    }
 
 
 def _gauge_values(program: Program) -> dict[str, object]:
@@ -188,7 +196,8 @@ def _body(program: Program) -> str:
         pieces += extras.tangent(program, values, _path_syntax(program))
     if "modified" in kernels:
         pieces += extras.modified(program, values)
-    pieces += [_render("api.c", values), static("energy"), exported("casimirs"), exported("vector_field")]
+    pieces += [_render("api.c", values), *lanes.pieces(program, values)]
+    pieces += [static("energy"), exported("casimirs"), exported("vector_field")]
     if any(apart(program) in piece for piece in pieces):
         pieces.insert(1, _render("apart.c", values))
     return "\n".join([*pieces, _render("observables.c", values)])

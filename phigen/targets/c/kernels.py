@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 from phigen.scheme.program import Kernel, Program
 from phigen.symbolic.entire import ENTIRE
@@ -27,67 +28,107 @@ CONSTANTS = {"pi": "3.141592653589793", "E": "2.718281828459045"}
 #: Most assignments in one function; longer ones take quadratic time to compile.
 LONGEST_FUNCTION = 200
 
+#: Points at which a kernel for lanes is evaluated at once: what one vector of AVX-512 holds.
+LANES = 8
+
+#: Functions with a version for the loops over lanes; a loop that calls any other is not vectorised.
+LANE_FUNCTIONS = ("exp", "expm1", *SPECIAL)
+
 
 def function(
-    program: Program, kernel: Kernel, *, exported: bool = False, functions: Mapping[str, str] = FUNCTIONS
+    program: Program,
+    kernel: Kernel,
+    *,
+    exported: bool = False,
+    lanes: bool = False,
+    functions: Mapping[str, str] = FUNCTIONS,
 ) -> str:
     """The C source of a kernel: one function, or a chain of static ones that share a workspace.
 
+    With ``lanes`` the kernel is evaluated at `LANES` points: each value becomes an array over them.
     ``functions`` are the names of those that it calls.
     """
     pieces = parts(lower(kernel), LONGEST_FUNCTION)
     workspace = 1 + max((int(a.target[2:]) for p in pieces for a in p.assignments if a.target[:2] == "w:"), default=0)
-    name = f"{program.name}_{kernel.name}"
+    if lanes:
+        functions = {**functions, **{f: f"{program.name}_{f}_lane" for f in LANE_FUNCTIONS}}
+    form = Form(f"{program.name}_{kernel.name}{'_lanes' if lanes else ''}", exported, lanes, functions)
     if len(pieces) == 1:
-        return _definition(program, kernel, name, pieces[0], functions, exported=exported)
-    texts = [
-        _definition(program, kernel, f"{name}_part{k}", piece, functions, workspace=workspace, part=(k, len(pieces)))
-        for k, piece in enumerate(pieces, 1)
-    ]
+        return _definition(program, kernel, form, pieces[0])
+    texts = []
+    for k, piece in enumerate(pieces, 1):
+        part = replace(form, name=f"{form.name}_part{k}", workspace=workspace, part=(k, len(pieces)))
+        texts.append(_definition(program, kernel, part, piece))
     arguments = ", ".join([*kernel.inputs, *(o.name for o in kernel.outputs), "work"])
-    lines = [_comment(kernel.purpose), *_signature(program, kernel, name, exported=exported), "{"]
-    lines.append(f"    double work[{workspace}];")
+    lines = [_purpose(program, kernel, form), *_signature(program, kernel, form), "{"]
+    lines.append(f"    {f'{program.name}_lanes' if lanes else 'double'} work[{workspace}];")
     if exported and "params" in kernel.inputs:
         lines.append(f"    if (params == NULL) params = &{program.name}_default_params;")
-    lines += [f"    {name}_part{k}({arguments});" for k in range(1, len(pieces) + 1)]
+    lines += [f"    {form.name}_part{k}({arguments});" for k in range(1, len(pieces) + 1)]
     return "\n\n".join([*texts, "\n".join([*lines, "}"])])
 
 
-def _definition(
-    program: Program,
-    kernel: Kernel,
-    name: str,
-    code: Code,
-    functions: Mapping[str, str],
-    *,
-    exported: bool = False,
-    workspace: int = 0,
-    part: tuple[int, int] = (1, 1),
-) -> str:
-    head = kernel.purpose if part[1] == 1 else f"{kernel.purpose} (part {part[0]} of {part[1]})"
-    lines = [_comment(head), *_signature(program, kernel, name, exported=exported, workspace=workspace), "{"]
-    return "\n".join([*lines, *_body(program, kernel, code, functions, workspace, exported=exported), "}"])
+@dataclass(frozen=True)
+class Form:
+    """How a kernel is printed: name and linkage; at one point or in lanes; what it calls; whole, or a ``part``."""
+
+    name: str
+    exported: bool = False
+    lanes: bool = False
+    functions: Mapping[str, str] = field(default_factory=lambda: FUNCTIONS)
+    workspace: int = 0
+    part: tuple[int, int] = (1, 1)
+
+    @property
+    def lane(self) -> str:
+        """The inner index of an array."""
+        return "[lane]" if self.lanes else ""
 
 
-def _signature(program: Program, kernel: Kernel, name: str, *, exported: bool = False, workspace: int = 0) -> list[str]:
+def _purpose(program: Program, kernel: Kernel, form: Form) -> str:
+    if form.lanes:
+        return f"/* {program.name}_{kernel.name} in all lanes. */"
+    return _comment(kernel.purpose)
+
+
+def _definition(program: Program, kernel: Kernel, form: Form, code: Code) -> str:
+    part = f"(part {form.part[0]} of {form.part[1]})"
+    head = _purpose(program, kernel, form)
+    if form.part[1] > 1:
+        head = f"/* {form.name} {part} */" if form.lanes else _comment(f"{kernel.purpose} {part}")
+    body = _body(program, kernel, form, code)
+    if form.lanes:
+        loop = [f"{each_lane(program)}", f"for (int lane = 0; lane < {program.name}_LANES; ++lane) {{"]
+        body = [line for line in body if "(void)" in line] + [
+            *(f"    {line}" for line in loop),
+            *(f"    {line}" for line in body if "(void)" not in line),
+            "    }",
+        ]
+    return "\n".join([head, *_signature(program, kernel, form), "{", *body, "}"])
+
+
+def _signature(program: Program, kernel: Kernel, form: Form) -> list[str]:
+    # C99 has no conversion from double (*)[8] to const double (*)[8]: the inputs of lanes are not const.
+    number = f"{program.name}_lanes" if form.lanes else "double"
+    given, alone = (number, "restrict ") if form.lanes else ("const double", "")
     arguments = [
         f"const {program.name}_params *params"
         if i == "params"
         else "double h"
         if i == "h"
-        else f"const double {i}[{max(1, len(symbols))}]"
+        else f"{given} {i}[{alone}{max(1, len(symbols))}]"
         for i, symbols in kernel.inputs.items()
     ]
     # restrict: the outputs never overlap the inputs of our own calls; callers of the API get no such duty.
-    qualifier = "" if exported else "restrict "
+    qualifier = "" if form.exported else "restrict "
     for o in kernel.outputs:
         # The caller of NAME_casimirs sizes the array by NAME_CASIMIRS, which may be 0.
-        size = "" if exported and kernel.name == "casimirs" else f"{qualifier}{max(1, len(o.values))}"
-        arguments.append(f"double {o.name}[{size}]")
-    if workspace:
-        arguments.append(f"double work[restrict {workspace}]")
-    text = ("void " if exported else f"{apart(program)} static void " if workspace else "static void ") + name + "("
-    return wrapped_arguments(text, arguments)
+        length = "" if form.exported and kernel.name == "casimirs" else f"{qualifier}{max(1, len(o.values))}"
+        arguments.append(f"{number} {o.name}[{length}]")
+    if form.workspace:
+        arguments.append(f"{number} work[restrict {form.workspace}]")
+    kind = "void " if form.exported else f"{apart(program)} static void " if form.workspace else "static void "
+    return wrapped_arguments(f"{kind}{form.name}(", arguments)
 
 
 def wrapped_arguments(head: str, arguments: Sequence[str]) -> list[str]:
@@ -101,12 +142,11 @@ def wrapped_arguments(head: str, arguments: Sequence[str]) -> list[str]:
     return lines
 
 
-def _body(
-    program: Program, kernel: Kernel, code: Code, functions: Mapping[str, str], workspace: int, *, exported: bool
-) -> list[str]:
-    arrays = [*kernel.inputs, *(o.name for o in kernel.outputs), "work"]
-    special = {f"function:{f}": f"{program.name}_{f}" for f in (*SPECIAL, *ENTIRE)}
-    scope = Scope({*C_RESERVED, *arrays, *special.values(), *functions.values()})
+def _body(program: Program, kernel: Kernel, form: Form, code: Code) -> list[str]:
+    arrays = [*kernel.inputs, *(o.name for o in kernel.outputs), "work", "lane"]
+    end = "_lane" if form.lanes else ""
+    special = {f"function:{f}": f"{program.name}_{f}{end}" for f in (*SPECIAL, *ENTIRE)}
+    scope = Scope({*C_RESERVED, *arrays, *special.values(), *form.functions.values()})
     for f, name in special.items():
         scope.bind(f, name)
     member = members(program)
@@ -122,23 +162,23 @@ def _body(
             elif array == "params":
                 scope.bind(s, f"params->{member[s]}")
             elif ":" in s:
-                scope.bind(s, f"{array}[{i}]")
+                scope.bind(s, f"{array}[{i}]{form.lane}")
             else:
-                lines.append(f"    const double {scope[s]} = {array}[{i}];")
-    for k in range(workspace):
-        scope.bind(f"w:{k}", f"work[{k}]")
-    show = printer(scope, functions)
+                lines.append(f"    const double {scope[s]} = {array}[{i}]{form.lane};")
+    for k in range(form.workspace):
+        scope.bind(f"w:{k}", f"work[{k}]{form.lane}")
+    show = printer(scope, form.functions)
     for a in code.assignments:
         declare = "" if a.target.startswith("w:") else "const double "
         lines.append(f"    {declare}{scope[a.target]} = {show(a.value)};")
     filled = {s.array for s in code.stores}
-    lines += [f"    {s.array}[{s.index}] = {show(s.value)};" for s in code.stores]
+    lines += [f"    {s.array}[{s.index}]{form.lane} = {show(s.value)};" for s in code.stores]
     unused = [i for i in kernel.inputs if i not in touched]
     unused += [o.name for o in kernel.outputs if o.name not in filled]
-    if workspace and not any("work[" in line for line in lines):
+    if form.workspace and not any("work[" in line for line in lines):
         unused.append("work")
     head = [f"    (void){u};" for u in unused]
-    if exported and "params" in touched:
+    if form.exported and "params" in touched:
         head.append(f"    if (params == NULL) params = &{program.name}_default_params;")
     return [*head, *lines]
 
@@ -151,6 +191,11 @@ def apart(program: Program) -> str:
 def printer(scope: Scope, functions: Mapping[str, str] = FUNCTIONS) -> Printer:
     """Prints lowered trees in C, with the names of a scope."""
     return Printer(lambda n: scope[n], functions, CONSTANTS, "pow")
+
+
+def each_lane(program: Program) -> str:
+    """The macro before a loop over lanes, which tells compilers that they are independent."""
+    return f"{program.name}_EACH_LANE"
 
 
 def members(program: Program) -> dict[str, str]:

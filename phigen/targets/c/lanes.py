@@ -1,0 +1,82 @@
+"""What the C code does for several steps or members at once: blocks of steps in `integrate`, and ensembles."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+from phigen.scheme.program import Program
+from phigen.symbolic.expression import topological
+from phigen.symbolic.special import LANE_REACH, SPECIAL, lane_coefficients, order_of
+from phigen.targets.c.kernels import LANES, each_lane, function
+from phigen.targets.rendering import render
+
+#: Bytes that the working arrays of a block may take on the stack.
+MOST_STACK = 256 * 1024
+
+#: Terms of the series of exp(r) − 1 for |r| ≤ ½ log 2, and the largest argument of exp in a lane.
+_EXP_TERMS, _EXP_REACH = 14, 700.0
+
+
+def blocks(program: Program) -> bool:
+    """Whether `integrate` takes blocks of steps: not for paths, explicit steps, or what would need too much stack."""
+    n = program.dimension
+    values = len(program.fractions) * (program.coefficients + 4 * n + 3 * n * n)
+    return program.driver == "newton" and 8 * LANES * values <= MOST_STACK
+
+
+def values(program: Program) -> Mapping[str, object]:
+    """What the templates of this room read."""
+    return {
+        "lanes": LANES,
+        "each_lane": each_lane(program),
+        "floor": "0.0" if program.relative else "1e-6",
+        "block_members": [
+            "int pause;   /* steps to make singly before a block is tried */",
+            "int setback; /* the last pause, halved with every block that succeeds */",
+            "size_t fitted; /* steps when recurrences were last fitted for blocks */",
+        ]
+        if blocks(program)
+        else [],
+    }
+
+
+def pieces(program: Program, values: Mapping[str, object]) -> list[str]:
+    """`integrate` and `ensemble`, with what they need."""
+    if not blocks(program):
+        return [render("c", "integrate.c", values), render("c", "ensemble.c", values)]
+    kernel = program.kernels["linearise"]
+    ops = {e.op for e in topological(kernel.roots)}
+    found = [render("c", "lanes.c", values)]
+    found += [render("c", "phi_lane.c", _phi(program, f)) for f in SPECIAL if f in ops]
+    found += [render("c", "expm1_lane.c", _exponential(program, f)) for f in ("exp", "expm1") if f in ops]
+    found.append(function(program, kernel, lanes=True) + "\n")
+    if "invert" in program.kernels:
+        found.append(function(program, program.kernels["invert"], lanes=True) + "\n")
+        found.append(render("c", "tabulate_unrolled.c", values))
+    else:
+        found.append(render("c", "tabulate.c", values))
+    templates = ("sizes", "chain", "block", "block_step", "integrate_blocks", "ensemble")
+    return found + [render("c", f"{template}.c", values) for template in templates]
+
+
+def _phi(program: Program, name: str) -> Mapping[str, object]:
+    *others, last = lane_coefficients(order_of(name))
+    return {
+        "name": f"{program.name}_{name}",
+        "reach": repr(LANE_REACH),
+        "last": repr(last),
+        "others": [repr(c) for c in reversed(others)],
+    }
+
+
+def _exponential(program: Program, name: str) -> Mapping[str, object]:
+    coefficients = [1 / math.factorial(k) for k in range(2, _EXP_TERMS + 1)]
+    return {
+        "name": f"{program.name}_{name}",
+        "meaning": {"exp": "exp(u)", "expm1": "exp(u) - 1"}[name],
+        "rest": {"exp": "power", "expm1": "(power - 1.0)"}[name],
+        "reach": repr(_EXP_REACH),
+        "last": repr(coefficients[-1]),
+        "others": [repr(c) for c in reversed(coefficients[:-1])],
+    }
