@@ -94,23 +94,32 @@ def run_figure(
     The trajectory of the first method, the sections and the Lyapunov exponents if there are any, the errors of all.
     """
     first = next(iter(methods.values()))
-    parts: list[tuple[float, Callable[[FigureBase], None]]] = [
-        (phase_space.height(first.coordinates), lambda part: phase_space.draw_trajectory(part, first, casimirs)),
-        (error_curves.height(methods), lambda part: error_curves.draw_errors(part, methods)),
-    ]
-    if sections:
-        parts.insert(
-            1, (_SECTION, lambda part: section_plane.draw_section(part.add_subplot(), sections, first.coordinates))
-        )
+
+    def draw_section(part: FigureBase) -> None:
+        section_plane.draw_section(part.add_subplot(), sections or {}, first.coordinates)
+
+    def draw_trajectory(part: FigureBase) -> None:
+        phase_space.draw_trajectory(part, first, casimirs)
+
+    rows: list[tuple[float, list[Callable[[FigureBase], None]]]]
+    rows = [(phase_space.height(first.coordinates), [draw_trajectory])]
+    if sections and phase_space.grid(first.coordinates) == (1, 1):
+        rows[0][1].append(draw_section)  # a single panel leaves room at its side
+    elif sections:
+        rows.append((_SECTION, [draw_section]))
+    rows.append((error_curves.height(methods), [lambda part: error_curves.draw_errors(part, methods)]))
     if spectrum:
-        parts.append((exponents.HEIGHT, lambda part: exponents.draw_exponents(part.add_subplot(), spectrum)))
-    heights = [height for height, _ in parts]
+        rows.append((exponents.HEIGHT, [lambda part: exponents.draw_exponents(part.add_subplot(), spectrum)]))
+    heights = [height for height, _ in rows]
     figure = _figure(sum(heights))
     if title:
         figure.suptitle(title, fontsize=11)
-    places = figure.subfigures(len(parts), 1, height_ratios=heights, squeeze=False)[:, 0]
-    for place, (_, draw) in zip(places, parts, strict=True):
-        draw(place)
+    places = figure.subfigures(len(rows), 1, height_ratios=heights, squeeze=False)[:, 0]
+    for place, (_, parts) in zip(places, rows, strict=True):
+        for part, draw in zip(
+            place.subfigures(1, len(parts), width_ratios=[1.1, 1][: len(parts)], squeeze=False)[0], parts, strict=True
+        ):
+            draw(part)
     return figure
 
 

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 
 #: Windows in which the largest error is drawn, where there are more rows.
 WINDOWS = 400
-#: Panels in a row, and the height of a row in inches.
-COLUMNS, ROW = 2, 2.3
+#: The height of a row of panels in inches.
+ROW = 2.3
 #: The unit in the last place, drawn as the level that nothing can be expected to stay below.
 ROUNDING = 2.0**-52
 
@@ -39,23 +39,26 @@ def windowed_maxima(t: Floats, values: Floats, windows: int = WINDOWS) -> tuple[
     return t[at], np.where(np.isfinite(values[at]), values[at], np.nan)
 
 
-def rows_of(methods: Mapping[str, Trajectory]) -> int:
-    """Rows of panels that `draw_errors` makes."""
-    return -(-(1 + len(next(iter(methods.values())).casimirs)) // COLUMNS)
+def grid(methods: Mapping[str, Trajectory]) -> tuple[int, int]:
+    """Rows and columns of the panels that `draw_errors` makes."""
+    panels = 1 + len(next(iter(methods.values())).casimirs)
+    columns = panels if panels <= 3 else 2 if panels == 4 else 3
+    return -(-panels // columns), columns
 
 
 def height(methods: Mapping[str, Trajectory]) -> float:
     """The height of all panels in inches."""
-    return ROW * rows_of(methods)
+    return ROW * grid(methods)[0]
 
 
 def draw_errors(figure: FigureBase, methods: Mapping[str, Trajectory]) -> None:
     """One panel for the energy and each Casimir, one curve for each method; the first method lies on top."""
     first = next(iter(methods.values()))
     panels = ["energy", *first.casimirs]
-    rows, shared = rows_of(methods), None
+    rows, columns = grid(methods)
+    shared: Any = None
     for index, name in enumerate(panels, start=1):
-        axes = figure.add_subplot(rows, min(COLUMNS, len(panels)), index, sharex=shared)
+        axes = figure.add_subplot(rows, columns, index, sharex=shared)
         shared = shared or axes
         curves, relative = {}, True
         for label, trajectory in methods.items():
@@ -65,11 +68,12 @@ def draw_errors(figure: FigureBase, methods: Mapping[str, Trajectory]) -> None:
             curves[label] = windowed_maxima(trajectory.t, errors)
         _draw_panel(axes, curves)
         what = "energy" if index == 1 else f"Casimir {name}"
-        axes.set_title(f"{'relative' if relative else 'absolute'} error of the {what}")
-        if index > len(panels) - min(COLUMNS, len(panels)):
+        axes.set_title(f"{'relative' if relative else 'absolute'} error{' of the' if columns < 3 else ':'} {what}")
+        if index > len(panels) - columns:
             axes.set_xlabel("t")
-        if index == 1 and len(methods) > 1:
-            axes.legend(loc="best")
+    if len(methods) > 1:
+        handles, labels = shared.get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside upper center", ncols=len(methods))
 
 
 def _draw_panel(axes: Any, curves: Mapping[str, tuple[Floats, Floats]]) -> None:

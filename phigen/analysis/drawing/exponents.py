@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from phigen.analysis.drawing.palette import PALETTE, SERIES
 
 if TYPE_CHECKING:
@@ -19,5 +21,9 @@ def draw_exponents(axes: Any, spectrum: Spectrum) -> None:
     for values in spectrum.history.T[:0:-1]:
         axes.plot(spectrum.times, values, color=PALETTE["leaf"], linewidth=0.9, zorder=2)
     axes.plot(spectrum.times, spectrum.history[:, 0], color=SERIES[0], linewidth=1.4, zorder=3)
+    # What the exponents are at the beginning says nothing, and would flatten the rest.
+    late = np.abs(spectrum.history[spectrum.times >= spectrum.t / 100])
+    height = 1.2 * float(np.max(late)) or 1.0
+    axes.set(xlim=(spectrum.t / 1000, 1.1 * spectrum.t), ylim=(-height, height))
     axes.set(xscale="log", xlabel="t", title=f"Lyapunov exponents; the largest is {spectrum.largest:.3g}")
     axes.grid(True)

@@ -46,6 +46,20 @@ def leaf_of(
     return None
 
 
+def around(leaf: Leaf, box: Floats) -> Floats:
+    """The box (2, 3) of the whole leaf if that is closed and not much larger than the given one, else the given one."""
+    middle, half = box.mean(axis=0), float(np.max(box[1] - box[0]))
+    large = np.stack([middle - half, middle + half])
+    lines = net(leaf, large)
+    if not lines:
+        return box
+    points = np.concatenate(lines)
+    low, high = points.min(axis=0), points.max(axis=0)
+    margin = 0.04 * (high - low)
+    inside = (low > large[0] + margin).all() and (high < large[1] - margin).all()
+    return np.stack([np.minimum(box[0], low - margin), np.maximum(box[1], high + margin)]) if inside else box
+
+
 def net(leaf: Leaf, box: Floats) -> list[Floats]:
     """Lines (points, 3) of the leaf in a box (2, 3) of lower and upper bounds."""
     lines = []

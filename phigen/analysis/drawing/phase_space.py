@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from phigen.analysis.arrays import Floats
+from phigen.analysis.drawing.dots import draw_dots
 from phigen.analysis.drawing.groups import Group, groups
-from phigen.analysis.drawing.leaf import Leaf, leaf_of, net
+from phigen.analysis.drawing.leaf import Leaf, around, leaf_of, net
 from phigen.analysis.drawing.palette import PALETTE, SERIES
 from phigen.runtime.trajectory import Trajectory
 from phigen.symbolic.expression import Expression
@@ -20,10 +21,13 @@ if TYPE_CHECKING:
 
 #: Up to so many coordinates are drawn panel by panel, more as an image over time.
 MOST_COORDINATES = 24
-#: Rows are not joined if the typical angle between their chords is more than this: the line would not be the orbit.
-TURN = math.radians(40)
-#: The view of a panel in space in degrees, and the bands of distance that fade towards the back.
-ELEVATION, AZIMUTH, BANDS = 22.0, -52.0, 4
+#: Rows are not joined if the typical angle between their chords is more than this, since the line would not be the
+#: orbit; of a long curve even chords that look right one by one cover the panel.
+TURN, FINE_TURN = math.radians(40), math.radians(15)
+#: A curve is long if it could cross its panel so many times.
+LONG = 60.0
+#: The views of a panel in space, in degrees, the usual one first; and the bands of distance that fade to the back.
+ELEVATION, AZIMUTHS, BANDS = 22.0, (-52.0, -22.0, 8.0, 38.0, -82.0, -112.0), 4
 
 
 def grid(coordinates: tuple[str, ...]) -> tuple[int, int]:
@@ -44,15 +48,16 @@ def draw_trajectory(figure: FigureBase, trajectory: Trajectory, casimirs: Mappin
     good = np.isfinite(trajectory.x).all(axis=1)
     t, x, names = trajectory.t[good], trajectory.x[good], trajectory.coordinates
     if len(names) > MOST_COORDINATES:
-        _draw_image(figure, t, x)
+        _draw_image(figure, names, t, x)
         return
     rows, columns = grid(names)
+    zoom = 0.9 if columns < 3 else 0.8  # the labels around the box are as large in small panels
     start = dict(zip(names, x[0].tolist(), strict=True))
     for index, group in enumerate(groups(names), start=1):
         points = x[:, [names.index(name) for name in group]]
         if len(group) == 3:
             axes = figure.add_subplot(rows, columns, index, projection="3d")
-            draw_in_space(axes, group, points, leaf_of(casimirs, group, start, trajectory.parameters))
+            draw_in_space(axes, group, points, leaf_of(casimirs, group, start, trajectory.parameters), zoom)
         elif len(group) == 2:
             draw_in_plane(figure.add_subplot(rows, columns, index), group, points)
         else:
@@ -63,17 +68,19 @@ def draw_in_plane(axes: Any, names: Group, points: Floats) -> None:
     """A curve (rows, 2), and where it starts."""
     _label(axes, names)
     axes.grid(True)
-    _draw_curve(axes, points, SERIES[0], 1.0, 2.0)
+    _draw_curve(axes, points, SERIES[0], 1.0, 2.0, _width(points), _joins(points))
     axes.plot(*points[0], "o", color=PALETTE["ink"], markersize=4, zorder=3)
+    axes.locator_params(axis="x", nbins=5)
 
 
-def draw_in_space(axes: Any, names: Group, points: Floats, leaf: Leaf | None) -> None:
+def draw_in_space(axes: Any, names: Group, points: Floats, leaf: Leaf | None, zoom: float) -> None:
     """A curve (rows, 3) over the net of its leaf, paler towards the back, and where it starts."""
-    box = _box(points)
+    box = around(leaf, _box(points)) if leaf else _box(points)
     # The same unit of length along all axes, unless a coordinate would be squeezed flat.
     size = box[1] - box[0]
-    axes.set_box_aspect(size if size.max() < 4 * size.min() else (1, 1, 1), zoom=1.0)
-    axes.view_init(ELEVATION, AZIMUTH)
+    axes.set_box_aspect(size if size.max() < 2.2 * size.min() else (1, 1, 1), zoom=zoom)
+    azimuth = _azimuth((points - points.mean(axis=0)) / size)
+    axes.view_init(ELEVATION, azimuth)
     axes.set(xlim=box[:, 0], ylim=box[:, 1], zlim=box[:, 2])
     _label(axes, names)
     for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
@@ -81,24 +88,45 @@ def draw_in_space(axes: Any, names: Group, points: Floats, leaf: Leaf | None) ->
         axis._axinfo["grid"].update(color=PALETTE["grid"], linewidth=0.4)
         axis.set_major_locator(_few_ticks())
     axes.tick_params(pad=-1, labelsize=7)
+    towards = _directions(azimuth)[2]
     if leaf:
         lines = [part for line in net(leaf, box) for part in (line, np.full((1, 3), np.nan))]
         if lines:
-            _draw_faded(axes, box, np.concatenate(lines), PALETTE["leaf"], 0.45, (0.2, 0.75), 1.0)
-    _draw_faded(axes, box, points, SERIES[0], None, (0.3, 1.0), 1.5)
+            _draw_faded(axes, box, towards, np.concatenate(lines), PALETTE["leaf"], 0.45, (0.2, 0.75), 1.0)
+    # Of a curve that winds around many times, bands would show where its chords happen to end.
+    alphas = (0.3, 1.0) if _length(points) < LONG else (0.8, 0.8)
+    _draw_faded(axes, box, towards, points, SERIES[0], _width(points), alphas, 1.5, _joins(points))
     axes.plot(*points[0], "o", color=PALETTE["ink"], markersize=4, zorder=20)
 
 
-def _draw_faded(
-    axes: Any, box: Floats, points: Floats, colour: str, width: float | None, alphas: tuple[float, float], order: float
-) -> None:
-    """Points (rows, 3) as a curve, in bands by their distance from the viewer."""
-    e, a = math.radians(ELEVATION), math.radians(AZIMUTH)
+def _directions(azimuth: float) -> Floats:
+    """The directions to the right, up and towards the viewer, as rows."""
+    e, a = math.radians(ELEVATION), math.radians(azimuth)
     towards = np.array([math.cos(e) * math.cos(a), math.cos(e) * math.sin(a), math.sin(e)])
+    right = np.array([-math.sin(a), math.cos(a), 0.0])
+    return np.stack([right, np.cross(towards, right), towards])
+
+
+def _azimuth(centred: Floats) -> float:
+    """A view in which the curve is not seen from its edge: the usual one, if another does not show much more of it."""
+    spread = centred.T @ centred
+
+    def area(azimuth: float) -> float:
+        plane = _directions(azimuth)[:2]
+        return float(np.linalg.det(plane @ spread @ plane.T))
+
+    best = max(AZIMUTHS, key=area)
+    return best if area(best) > 3 * area(AZIMUTHS[0]) else AZIMUTHS[0]
+
+
+def _draw_faded(
+    axes: Any, box: Floats, towards: Floats, points: Floats, colour: str, width: float,
+    alphas: tuple[float, float], order: float, joined: bool = True,
+) -> None:  # fmt: skip
+    """Points (rows, 3) as a curve, in bands by their distance from the viewer."""
     centred = (points - box.mean(axis=0)) / (box[1] - box[0])
     depth = np.clip(centred @ towards / np.abs(towards).sum() * 2 + 0.5, 0, 1 - 1e-9)
     band = np.where(np.isfinite(depth), np.floor(depth * BANDS), -1)
-    joined = width is not None or _joins(points)
     for level in range(BANDS):
         # A band keeps the point after its last one, so that no gap opens between bands.
         inside = band == level
@@ -109,19 +137,21 @@ def _draw_faded(
             _draw_curve(axes, kept, colour, alpha, order + 10 * (level >= BANDS / 2), width, joined)
 
 
-def _draw_curve(
-    axes: Any, points: Floats, colour: str, alpha: float, order: float, width: float | None = None,
-    joined: bool | None = None,
-) -> None:  # fmt: skip
-    """A line, thinner the more rows it has, or dots where the rows are too far apart for one."""
-    count = len(points)
-    if joined if joined is not None else _joins(points):
-        thin = width or float(np.clip(1.5 - 0.35 * math.log10(max(count, 1) / 100), 0.5, 1.5))
-        axes.plot(*points.T, "-", color=colour, linewidth=thin, alpha=alpha, zorder=order)
+def _draw_curve(axes: Any, points: Floats, colour: str, alpha: float, order: float, width: float, joined: bool) -> None:
+    """A line, or dots where the rows are too far apart for one."""
+    if joined:
+        axes.plot(*points.T, "-", color=colour, linewidth=width, alpha=alpha, zorder=order)
+        return
+    size = float(np.clip(3.0 - 0.8 * math.log10(max(len(points), 1) / 100), 0.8, 3.0))
+    if points.shape[1] == 2:
+        draw_dots(axes, points, colour, size, order)
     else:
-        size = float(np.clip(3.0 - 0.8 * math.log10(max(count, 1) / 100), 0.8, 3.0))
-        many = {"rasterized": True} if count > 10_000 else {}
-        axes.plot(*points.T, ".", color=colour, markersize=size, markeredgewidth=0, alpha=alpha, zorder=order, **many)
+        axes.plot(*points.T, ".", color=colour, markersize=size, markeredgewidth=0, alpha=alpha, zorder=order)
+
+
+def _width(points: Floats) -> float:
+    """Of a line: the longer, the thinner."""
+    return float(np.clip(1.5 * math.sqrt(LONG / 2 / max(_length(points), 1e-9)), 0.3, 1.5))
 
 
 def _joins(points: Floats) -> bool:
@@ -135,10 +165,11 @@ def _joins(points: Floats) -> bool:
     if len(chords) < 3:
         return True
     cosines = np.sum(chords[1:] * chords[:-1], axis=1) / (lengths[1:] * lengths[:-1])
-    return bool(np.median(np.arccos(np.clip(cosines, -1, 1))) < TURN)
+    turn = float(np.median(np.arccos(np.clip(cosines, -1, 1))))
+    return turn < (TURN if np.sum(lengths) < LONG else FINE_TURN)
 
 
-def _draw_image(figure: FigureBase, t: Floats, x: Floats) -> None:
+def _draw_image(figure: FigureBase, names: Group, t: Floats, x: Floats) -> None:
     """All coordinates over time, as colours."""
     axes = figure.add_subplot()
     most = float(np.max(np.abs(x))) or 1.0
@@ -147,15 +178,19 @@ def _draw_image(figure: FigureBase, t: Floats, x: Floats) -> None:
         x[times].T, aspect="auto", origin="lower", cmap="RdBu_r", vmin=-most, vmax=most, interpolation="nearest",
         extent=(t[0], t[-1], 0.5, x.shape[1] + 0.5),
     )  # fmt: skip
-    axes.set(xlabel="t", ylabel="coordinate")
+    named = range(0, len(names), -(-len(names) // 10))
+    axes.set_yticks([1.0 + i for i in named], [names[i] for i in named])
+    axes.set_xlabel("t")
     figure.colorbar(shown, ax=axes, pad=0.02)
 
 
 def _box(points: Floats) -> Floats:
-    """Bounds (2, 3) around points, not too flat, with a margin."""
-    low, high = points.min(axis=0), points.max(axis=0)
+    """Bounds (2, 3) around points with a margin; flat in no direction, unless that has a scale of its own."""
+    low, high, most = points.min(axis=0), points.max(axis=0), np.max(np.abs(points), axis=0)
     size = high - low
-    half = np.maximum(0.55 * size, 0.2 * size.max() or 0.5)
+    alike = most > 0.01 * most.max()
+    half = np.maximum(0.53 * size, np.where(alike, 0.2 * size.max(), 0.05 * most))
+    half[half == 0] = 0.2 * size.max() or 0.5
     middle = (low + high) / 2
     return np.stack([middle - half, middle + half])
 
@@ -167,5 +202,11 @@ def _few_ticks() -> Any:
 
 
 def _label(axes: Any, names: Group) -> None:
-    for axis, name in zip("xyz", names, strict=False):
-        getattr(axes, f"set_{axis}label")(name, labelpad=-4 if len(names) == 3 else 2)
+    for axis, name, pad in zip("xyz"[: len(names)], names, (-6, -6, -2) if len(names) == 3 else (2, 2), strict=True):
+        getattr(axes, f"set_{axis}label")(name, labelpad=pad)
+
+
+def _length(points: Floats) -> float:
+    """The length of the curve if the space it fills had the size 1 in each direction."""
+    size = np.ptp(points, axis=0)
+    return float(np.sum(np.linalg.norm(np.diff(points / np.where(size > 0, size, 1.0), axis=0), axis=1)))

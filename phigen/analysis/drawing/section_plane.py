@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from phigen.analysis.arrays import Floats
+from phigen.analysis.drawing.dots import draw_dots
 from phigen.analysis.drawing.groups import groups
 from phigen.analysis.drawing.palette import SERIES
 
@@ -33,22 +34,24 @@ def draw_section(axes: Any, sections: Mapping[str, Floats], names: Sequence[str]
     i, j = plane_of(names, np.concatenate(given) if given else np.empty((0, len(names))))
     for place, (label, points) in enumerate(sections.items()):
         size = float(np.clip(4.0 - 1.1 * math.log10(max(len(points), 1) / 30), 0.8, 4.0))
-        axes.plot(
-            points[:, i], points[:, j], "o", markersize=size, markeredgewidth=0, color=SERIES[place % len(SERIES)],
-            label=label, rasterized=len(points) > 10_000, zorder=2,
-        )  # fmt: skip
+        draw_dots(axes, points[:, [i, j]], SERIES[place % len(SERIES)], size, 2.0, label)
     axes.set(xlabel=names[i], ylabel=names[j])
     axes.grid(True)
+    axes.locator_params(axis="x", nbins=6)
+    axes.set_box_aspect(0.75)
     _widen(axes)
     if len(sections) > 1:
-        axes.legend(loc="best", markerscale=2)
+        axes.legend(loc="best")
+    else:
+        label, points = next(iter(sections.items()))
+        axes.set_title(f"section {label}: {len(points)} crossings")
 
 
 def _widen(axes: Any) -> None:
     """Points in one place, up to rounding, are shown as that, not as a cloud of rounding errors."""
     for kind in "xy":
         low, high = getattr(axes, f"get_{kind}lim")()
-        least = 1e-3 * max(abs(low), abs(high), 1e-9)
-        if high - low < least:
-            middle = (low + high) / 2
-            getattr(axes, f"set_{kind}lim")(middle - 50 * least, middle + 50 * least)
+        middle, half = (low + high) / 2, (high - low) / 2
+        least = 0.05 * max(abs(middle), 1e-9)
+        if half < 1e-2 * least:
+            getattr(axes, f"set_{kind}lim")(middle - least, middle + least)
