@@ -24,7 +24,7 @@ from phigen.scheme.discretisation import series_of
 from phigen.scheme.gauge import Gauge, choose, given
 from phigen.scheme.order import Order, plan_order
 from phigen.scheme.program import Program
-from phigen.scheme.splitting import build_splitting
+from phigen.scheme.splitting import arranged, build_splitting
 from phigen.scheme.splitting import plan as plan_splitting
 from phigen.series.hamilton_jacobi import PolynomialSeries
 from phigen.spec.model import Extras, Spec
@@ -118,7 +118,7 @@ def compile_spec(
 def _split(spec: Spec, source: System, order: int | None, described: Mapping[str, Any], clock: _Clock) -> Compilation:
     """Compile to a splitting."""
     gauge = Gauge() if isinstance(spec.gauge, str) else given(source, spec.gauge)
-    splitting = clock.timed("splitting", lambda: split(gauge.applied(source)))
+    splitting = clock.timed("splitting", lambda: arranged(split(gauge.applied(source))))
     plan, method = plan_splitting(source, order or spec.order, spec.composition)
     program = clock.timed("program", lambda: build_splitting(source, splitting, plan, method, gauge, **described))
     return Compilation(spec, source, None, plan, program, gauge, clock.seconds, splitting)

@@ -245,9 +245,11 @@ def _value(e: Expression, args: list[Any], at: Mapping[str, Any]) -> Any:
             return mpmath.sign(args[0])
         case "versin":
             return 1 - mpmath.cos(args[0])
+        case "inv":
+            return 1 / args[0] if args[0] > 0 else mpmath.nan
         case "phi0" | "phi1" | "phi2":
             return _phi(int(e.op[3:]), args[0])
-        case "cosroot" | "sinroot" | "sinroot1" | "exprel" | "exprel1":
+        case "cosroot" | "sinroot" | "sinroot1" | "arcroot" | "exprel" | "exprel1":
             return _entire(e.op, args[0])
     return getattr(mpmath, e.op)(*args)
 
@@ -259,6 +261,8 @@ def _entire(name: str, s: Any) -> Any:
         root = mpmath.sqrt(z)
         if name.startswith("exprel"):
             return (mpmath.exp(z) - 1) / z
+        if name == "arcroot":
+            return (root - mpmath.sin(root)) / root**3
         return mpmath.cos(root) if name == "cosroot" else mpmath.sin(root) / root
 
     return mpmath.re(mpmath.diff(closed, mpmath.mpc(s)) if name.endswith("1") else closed(mpmath.mpc(s)))

@@ -200,6 +200,10 @@ def _visit(node: Expression, args: list[Sum]) -> Sum:
             return (*_called("exp", args), Term(Fraction(-1)))
         case "versin":
             return (Term(Fraction(1)), *_negated(_called("cos", args)))
+        case "log1p":
+            return _called("log", [_sorted((Term(Fraction(1)), *args[0]))])
+        case "inv":
+            return _power(args[0], Fraction(-1))
         case op if op in ENTIRE:
             return _entire(op, args[0])
         case "abs":
@@ -220,6 +224,8 @@ def _entire(name: str, s: Sum) -> Sum:
             return sin
         case "sinroot1":
             return _times((Term(Fraction(1, 2)),), cos + _negated(sin), inverse)
+        case "arcroot":
+            return _times((Term(Fraction(1)), *_negated(sin)), _power(s, Fraction(-1)))
         case "exprel":
             return relative
     return _times(exp + _negated(relative), inverse)

@@ -108,6 +108,10 @@ def to_sympy(e: Expression) -> Any:
             return sympy.exp(args[0]) - 1
         if node.op == "versin":
             return 1 - sympy.cos(args[0])
+        if node.op == "log1p":
+            return sympy.log(1 + args[0])
+        if node.op == "inv":
+            return 1 / args[0]
         if node.op in ENTIRE:
             return _entire(node.op, *args)
         if node.op in SPECIAL:
@@ -121,7 +125,7 @@ def _entire(name: str, s: Any) -> Any:
     """A function of `ENTIRE`, as its closed form for s > 0."""
     root = sympy.sqrt(s)
     cos, sin, relative = sympy.cos(root), sympy.sin(root) / root, (sympy.exp(s) - 1) / s
-    closed = {"cosroot": cos, "sinroot": sin, "sinroot1": (cos - sin) / (2 * s)}
+    closed = {"cosroot": cos, "sinroot": sin, "sinroot1": (cos - sin) / (2 * s), "arcroot": (1 - sin) / s}
     return (closed | {"exprel": relative, "exprel1": (sympy.exp(s) - relative) / s})[name]
 
 

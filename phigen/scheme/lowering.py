@@ -17,6 +17,7 @@ from phigen.symbolic.special import SPECIAL
 #: Cost of an operation in units of one addition, as measured on current x86-64 processors (throughput). φ and its
 #: derivatives are nine-term series near 0, and a test.
 COST = {"add": 1, "sub": 1, "mul": 1, "neg": 0, "reciprocal": 4, "sqrt": 5, "call": 20}
+COST["inv"] = 5
 COST |= dict.fromkeys((*SPECIAL, *ENTIRE), 18)
 
 #: Longest tree that is printed as one statement, in operations.

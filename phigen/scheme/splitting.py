@@ -39,6 +39,15 @@ def plan(system: System, order: int | None, composition: str) -> tuple[Order, Al
     return Order(even, 0, note), found
 
 
+def arranged(splitting: Splitting) -> Splitting:
+    """The parts in the order in which a step is cheapest: the costliest last, since it occurs once in a stage.
+
+    The first occurs once too, and once more in all; those in the middle occur twice.
+    """
+    by_cost = sorted(splitting.flows, key=lambda flow: cost(flow.increment))
+    return Splitting((*by_cost[-2:-1], *by_cost[:-2], *by_cost[-1:]))
+
+
 def build_splitting(
     system: System,
     splitting: Splitting,

@@ -33,9 +33,9 @@ class LinearMotion:
 
 @dataclass(frozen=True)
 class Motion:
-    """How the coordinates move: those that stand still, the linear motions, and the rates of the rest."""
+    """How the coordinates move: the ``moving`` variables, linear motions, and the rates of the other coordinates."""
 
-    frozen: tuple[int, ...]
+    moving: frozenset[int]
     linear: tuple[LinearMotion, ...]
     other: Mapping[int, Poly]
 
@@ -47,11 +47,9 @@ def motion_of(ring: Ring, field: Sequence[Poly]) -> Motion:
     rows: dict[Monomial, Row] = {}
     starts: dict[Monomial, int] = {}
     other: dict[int, Poly] = {}
-    frozen: list[int] = []
     for i, c in enumerate(ring.coordinates):
         v = ring.tower.names.index(c)
         if v not in rates:
-            frozen.append(i)
             continue
         start = tuple(int(k == v) for k in range(len(ring.tower.names)))
         found = _closed(ring, rates, start, rows)
@@ -60,7 +58,7 @@ def motion_of(ring: Ring, field: Sequence[Poly]) -> Motion:
         else:
             rows |= found
             starts[start] = i
-    return Motion(tuple(frozen), tuple(_motions(ring, rows, starts)), other)
+    return Motion(frozenset(rates), tuple(_motions(ring, rows, starts)), other)
 
 
 def _closed(

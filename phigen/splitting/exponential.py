@@ -15,6 +15,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from math import isqrt
 
 from phigen.splitting.closure import LinearMotion
 from phigen.splitting.ring import TIME, Ring
@@ -22,6 +23,9 @@ from phigen.symbolic.expression import Expression, call, number, sqrt, symbol
 from phigen.symbolic.tower import Poly, rational
 
 Matrix = Sequence[Sequence[Poly]]
+
+#: The manner of a motion at a constant rate.
+SHIFTED = "shifted"
 
 _HALF = number(Fraction(1, 2))
 
@@ -73,13 +77,13 @@ def _nilpotent(ring: Ring, powers: Sequence[Matrix], images: Sequence[Sequence[P
         factorial *= k
         scale = t**k * tower.constant(Fraction(1, factorial))
         total = [tower.combine([s, scale * v]) for s, v in zip(total, image, strict=True)]
-    manner = "shifted" if len(images) == 2 else "moved by a polynomial in t"
+    manner = SHIFTED if len(images) == 2 else "moved by a polynomial in t"
     return Solution(tuple(ring.expression(s) for s in total), manner)
 
 
 def _scaling(ring: Ring, powers: Sequence[Matrix], images: Sequence[Sequence[Poly]], a: int) -> Solution | None:
     """If A^{a+1} = dA^a."""
-    d = _ratio(ring, powers[a], powers[a - 1])
+    d = _ratio(ring, powers[a], powers[a - 1], powers[0])
     if d is None:
         return None
     t, exponent = symbol(TIME), ring.expression(d * ring.tower.variable(TIME))
@@ -100,7 +104,7 @@ def _scaling(ring: Ring, powers: Sequence[Matrix], images: Sequence[Sequence[Pol
 
 def _turning(ring: Ring, powers: Sequence[Matrix], images: Sequence[Sequence[Poly]], a: int) -> Solution | None:
     """If A^{a+2} = −cA^a."""
-    c = None if len(powers) < a + 2 else _ratio(ring, powers[a + 1], powers[a - 1])
+    c = None if len(powers) < a + 2 else _ratio(ring, powers[a + 1], powers[a - 1], powers[1])
     if c is None:
         return None
     root = _root(ring, -c)
@@ -112,15 +116,27 @@ def _turning(ring: Ring, powers: Sequence[Matrix], images: Sequence[Sequence[Pol
         units = [[v / root.scale**k for v in listed] for k, listed in ((a, directed), (a + 1, further))]
         first = [ring.expression(v) for v in images[0]]
         return _circular(first, units, angle, a) if root.positive else _hyperbolic(first, units, angle, a)
-    if a == 2:
-        return None
-    t = symbol(TIME)
-    quarter = ring.expression(-c * ring.tower.variable(TIME) ** 2) / 4
-    sine, cosine = call("sinroot", quarter), call("cosroot", quarter)
+    return _without_quotients(ring, images, -c, a)
+
+
+def _without_quotients(ring: Ring, images: Sequence[Sequence[Poly]], c: Poly, a: int) -> Solution | None:
+    """The same by functions of s = ct²: sin and 1 − cos of the angle √s by those of its half.
+
+    With a = 2 only where c is static, since the derivative of arcroot is not available at 0.
+    """
+    t, s = symbol(TIME), ring.expression(c * ring.tower.variable(TIME) ** 2)
     first, second = ([ring.expression(v) for v in images[k]] for k in (0, 1))
-    speed = t * sine
-    increments = tuple(speed * (cosine * u + _HALF * speed * v) for u, v in zip(first, second, strict=True))
-    return Solution(increments, "turned")
+    speed = t * call("sinroot", s / 4)
+    if a == 1:
+        cosine = call("cosroot", s / 4)
+        increments = tuple(speed * (cosine * u + _HALF * speed * v) for u, v in zip(first, second, strict=True))
+        return Solution(increments, "turned")
+    if ring.support(c):
+        return None
+    versine, rest = _HALF * speed**2, t**3 * call("arcroot", s)
+    third = [ring.expression(v) for v in images[2]]
+    increments = tuple(t * u + (versine * v + rest * w) for u, v, w in zip(first, second, third, strict=True))
+    return Solution(increments, "turned and shifted")
 
 
 def _circular(
@@ -163,16 +179,18 @@ def _image(ring: Ring, a: Matrix, w: Sequence[Poly]) -> list[Poly]:
     return [ring.tower.combine(e * v for e, v in zip(row, w, strict=True)) for row in a]
 
 
-def _ratio(ring: Ring, a: Matrix, b: Matrix) -> Poly | None:
-    """d with a = d·b, if there is one in the ring."""
+def _ratio(ring: Ring, a: Matrix, b: Matrix, guess: Matrix) -> Poly | None:
+    """d with a = d·b, if there is one in the ring.
+
+    Reciprocals that were cancelled may hide it from the division; then it stands on the diagonal of ``guess``.
+    """
     pairs = [(x, y) for left, right in zip(a, b, strict=True) for x, y in zip(left, right, strict=True)]
     if any(x != 0 and y == 0 for x, y in pairs):
         return None
-    for top, bottom in ((x, y) for x, y in pairs if y != 0):
-        d, rest = divmod(top, bottom)
-        if rest == 0:
-            return d if all(ring.tower.is_zero(x - d * y) for x, y in pairs) else None
-    return None
+    divided = [divmod(x, y) for x, y in pairs if y != 0]
+    candidates = [quotient for quotient, rest in divided if rest == 0][:1]
+    candidates += [guess[i][i] for i in range(len(guess)) if guess[i][i] != 0]
+    return next((d for d in candidates if all(ring.tower.is_zero(x - d * y) for x, y in pairs)), None)
 
 
 def _quotients(ring: Ring, elements: Sequence[Poly], divisor: Poly) -> list[Expression] | None:
@@ -199,4 +217,13 @@ def _root(ring: Ring, c: Poly) -> _Root | None:
     for factor, multiplicity in factors:
         element *= factor ** (int(multiplicity) // 2)
     value = rational(content)
-    return _Root(value > 0, sqrt(number(abs(value))), element)
+    return _Root(value > 0, _square_root(abs(value)), element)
+
+
+def _square_root(value: Fraction) -> Expression:
+    top, bottom = isqrt(value.numerator), isqrt(value.denominator)
+    return (
+        number(Fraction(top, bottom))
+        if top**2 == value.numerator and bottom**2 == value.denominator
+        else sqrt(number(value))
+    )

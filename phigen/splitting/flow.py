@@ -9,10 +9,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from phigen.geometry.system import hamiltonian_vector_field
+from phigen.splitting import exponential, scalar
 from phigen.splitting.closure import motion_of
-from phigen.splitting.exponential import NoClosedFormError, solve
-from phigen.splitting.ring import Ring
-from phigen.symbolic.expression import ZERO, Expression, substitute, symbol, total
+from phigen.splitting.exponential import NoClosedFormError
+from phigen.splitting.integrals import reduced
+from phigen.splitting.ring import TIME, Ring
+from phigen.symbolic.expression import ZERO, Expression, gradient, substitute, symbol, topological, total
 from phigen.symbolic.tower import Poly
 
 
@@ -33,9 +36,9 @@ class Flow:
     manner: str
 
     @property
-    def is_still(self) -> bool:
-        """Whether nothing moves: the Hamiltonian is a Casimir."""
-        return all(e.is_zero for e in self.increment)
+    def moving(self) -> int:
+        """The number of coordinates that move."""
+        return sum(not e.is_zero for e in self.increment)
 
 
 class NoFlowError(Exception):
@@ -51,11 +54,11 @@ def flow_of(ring: Ring, terms: Sequence[Term]) -> Flow:
     pieces: list[tuple[list[Term], Flow]] = []
     for term in terms:
         if pieces:
-            joint = _attempt(ring, [*pieces[-1][0], term])
+            joint = joint_flow(ring, [*pieces[-1][0], term])
             if isinstance(joint, Flow):
                 pieces[-1] = ([*pieces[-1][0], term], joint)
                 continue
-        alone = _attempt(ring, [term])
+        alone = joint_flow(ring, [term])
         if not isinstance(alone, Flow):
             raise NoFlowError(term, alone)
         pieces.append(([term], alone))
@@ -64,51 +67,93 @@ def flow_of(ring: Ring, terms: Sequence[Term]) -> Flow:
 
 
 def _composed(ring: Ring, flows: Sequence[Flow]) -> Flow:
-    total_increment: list[Expression] = [ZERO] * len(ring.coordinates)
-    for flow in flows:
-        point = {c: symbol(c) + e for c, e in zip(ring.coordinates, total_increment, strict=True)}
-        moved = substitute(flow.increment, point)
-        total_increment = [e + m for e, m in zip(total_increment, moved, strict=True)]
-    manner = "; then ".join(f.manner for f in flows)
-    return Flow(total(f.hamiltonian for f in flows), tuple(total_increment), manner)
+    """The composition; flows that move least come first, so that the others see coordinates as they were."""
+    ordered = sorted(flows, key=lambda f: f.moving)
+    so_far: list[Expression] = [ZERO] * len(ring.coordinates)
+    for flow in ordered:
+        point = {c: symbol(c) + e for c, e in zip(ring.coordinates, so_far, strict=True) if not e.is_zero}
+        so_far = [e + m for e, m in zip(so_far, substitute(flow.increment, point), strict=True)]
+    manner = "; then ".join(f.manner for f in ordered)
+    return Flow(total(f.hamiltonian for f in ordered), tuple(so_far), manner)
 
 
-def _attempt(ring: Ring, terms: Sequence[Term]) -> Flow | str:
-    """The joint flow of terms, or why there is none."""
+def joint_flow(ring: Ring, terms: Sequence[Term], *, linear: bool = False) -> Flow | str:
+    """The joint flow of terms, or why there is none; ``linear`` admits only flows of linear equations.
+
+    These keep small coordinates to their own precision, which differences with a constant sum do not.
+    """
     g = total(t.expression for t in terms)
     field = ring.field(ring.tower.combine(t.element for t in terms))
+    found = _solved(ring, field, linear)
+    if isinstance(found, str) and not linear:
+        by_integrals = _with_integrals(ring, field)
+        if by_integrals is None:
+            return found
+        found = by_integrals
+    if isinstance(found, str):
+        return found
+    return Flow(g, tuple(_as_written(ring, g, found)), found.manner)
+
+
+@dataclass(frozen=True)
+class _Solved:
+    """Increments, how the coordinates move, and those that move at a constant rate (indices)."""
+
+    increments: list[Expression]
+    manner: str
+    shifted: tuple[int, ...]
+
+
+def _solved(ring: Ring, field: Sequence[Poly], linear: bool = False) -> _Solved | str:
+    """The increments along a vector field, or why there are none."""
     motion = motion_of(ring, field)
-    names = ring.coordinates
-    if motion.other:
-        i = min(motion.other)
-        return f"the equation of {names[i]} along its flow is not linear"
-    increments: list[Expression] = [ZERO] * len(names)
-    manners = []
-    for linear in motion.linear:
-        moving = ", ".join(names[i] for i in linear.coordinates)
+    increments: list[Expression] = [ZERO] * len(ring.coordinates)
+    manners: dict[str, list[int]] = {}
+    for i, rate in motion.other.items():
+        alone = None if linear else scalar.solve(ring, i, rate, motion.moving)
+        if alone is None:
+            return f"phigen cannot solve the equation of {ring.coordinates[i]} along its flow, which is not linear"
+        increments[i] = alone.increments[0]
+        manners.setdefault(alone.manner, []).append(i)
+    for equations in motion.linear:
         try:
-            solution = solve(ring, linear)
+            solution = exponential.solve(ring, equations)
         except NoClosedFormError as error:
-            return f"phigen has no closed form for the motion of {moving} along its flow: {error}"
-        for i, e in zip(linear.coordinates, solution.increments, strict=True):
+            names = ", ".join(ring.coordinates[i] for i in equations.coordinates)
+            return f"phigen has no closed form for the motion of {names} along its flow: {error}"
+        for i, e in zip(equations.coordinates, solution.increments, strict=True):
             increments[i] = e
-        manners.append((moving, solution.manner))
-    increments = _as_written(ring, g, field, motion.frozen, increments)
-    return Flow(g, tuple(increments), _manner(manners))
+        manners.setdefault(solution.manner, []).extend(equations.coordinates)
+    said = [f"{', '.join(ring.coordinates[i] for i in moved)} {manner}" for manner, moved in manners.items()]
+    return _Solved(increments, "; ".join(said) or "nothing moves", tuple(manners.get(exponential.SHIFTED, ())))
 
 
-def _as_written(
-    ring: Ring, g: Expression, field: Sequence[Poly], frozen: Sequence[int], increments: Sequence[Expression]
-) -> list[Expression]:
-    """The increments, in the form of the derivative of g as it was written where that has fewer operations.
+def _with_integrals(ring: Ring, field: Sequence[Poly]) -> _Solved | None:
+    """The same with linear first integrals put in as constants."""
+    smaller = reduced(ring, field)
+    found = None if smaller is None else _solved(smaller.ring, smaller.field)
+    if smaller is None or found is None or isinstance(found, str):
+        return None
+    changes = substitute(found.increments, smaller.integrals)
+    along = dict(zip(ring.coordinates, changes, strict=True))
+    for i, form in smaller.forms.items():
+        changes[i] = -substitute([form], along)[0]
+    names = ", ".join(ring.coordinates[i] for i in smaller.forms)
+    return _Solved(changes, f"{found.manner}; {names} by linear integrals", ())
 
-    (x − y)⁴ costs less than its five terms. It applies to coordinates whose rate is frozen.
-    """
-    return list(increments)
+
+def _as_written(ring: Ring, g: Expression, found: _Solved) -> list[Expression]:
+    """t π∇g of g as it was written, for coordinates that are shifted, where it has fewer operations: (x − y)⁴ has."""
+    slope = gradient(symbol(TIME) * g, ring.coordinates)
+    written = hamiltonian_vector_field(ring.brackets, slope)
+    mixed = [written[i] if i in found.shifted else e for i, e in enumerate(found.increments)]
+    return min(found.increments, mixed, key=lambda increments: _operations(ring, increments))
 
 
-def _manner(manners: Sequence[tuple[str, str]]) -> str:
-    grouped: dict[str, list[str]] = {}
-    for moving, manner in manners:
-        grouped.setdefault(manner, []).append(moving)
-    return "; ".join(f"{', '.join(moving)} {manner}" for manner, moving in grouped.items()) or "nothing moves"
+def _operations(ring: Ring, increments: Sequence[Expression]) -> int:
+    """Operations on the state."""
+    moving: set[int] = set()
+    for e in topological(increments):
+        if (e.op == "symbol" and e.value in ring.coordinates) or any(id(a) in moving for a in e.args):
+            moving.add(id(e))
+    return sum(1 for e in topological(increments) if e.args and id(e) in moving)

@@ -1,19 +1,22 @@
-"""Which terms of H go together: as few parts as possible, each of terms that commute and have elementary flows.
-
-Terms that do not commute must be in different parts: a colouring of the graph of conflicts, by the rule of D. Brélaz
-(DSATUR, 1979), which finds two colours wherever two suffice, as in lattices.
-"""
+"""Which terms of H go together: as few parts as possible, each of terms that commute and have elementary flows."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from phigen.errors import Diagnostic, SpecError
 from phigen.geometry.system import System
-from phigen.splitting.flow import Flow, NoFlowError, Term, flow_of
+from phigen.splitting.conflicts import grouped
+from phigen.splitting.flow import Flow, NoFlowError, Term, flow_of, joint_flow
+from phigen.splitting.regrouping import by_blocks, with_companions
 from phigen.splitting.ring import Ring, ring_of
 from phigen.splitting.terms import hamiltonian_terms, terms_of
 from phigen.symbolic.expression import text
+from phigen.symbolic.numeric import DomainError, evaluate
+
+#: How often a companion is taken out of the terms.
+ROUNDS = 3
 
 
 @dataclass(frozen=True)
@@ -31,40 +34,66 @@ def split(system: System) -> Splitting:
     listed = hamiltonian_terms(system)
     ring = ring_of(system, listed)
     terms = terms_of(ring, listed)
-    colours = coloured(conflicts(ring, terms))
+    refused: NoFlowError | None = None
+    best: list[Flow] | None = None
+    for candidate in _candidates(system, ring, terms):
+        parts = grouped(ring, candidate)
+        if best is not None and len(parts) >= len(best):
+            continue
+        try:
+            best = [flow_of(ring, part) for part in parts]
+        except NoFlowError as error:
+            refused = refused or error
+    if best is None:
+        raise _refusal(system, refused)
+    return Splitting(tuple(_merged(ring, best)))
+
+
+def _candidates(system: System, ring: Ring, terms: list[Term]) -> Iterator[list[Term]]:
+    """The terms as they are, with companions taken out, and by blocks of π."""
+    yield terms
+    blocked = by_blocks(system, ring, terms)
+    if blocked:
+        yield blocked
+    for _ in range(ROUNDS):
+        fewest = len(grouped(ring, terms))
+        found = [c for c in with_companions(system, ring, terms) if len(grouped(ring, c)) < fewest]
+        if not found:
+            return
+        found.sort(key=lambda c: (len(grouped(ring, c)), _size(system, ring, c)))
+        yield from found
+        terms = found[0]
+
+
+def _size(system: System, ring: Ring, terms: Sequence[Term]) -> float:
+    """The sum of the magnitudes of the coefficients of terms that move something, parameters at their defaults."""
+    values = {p.name: float(p.value) for p in system.parameters}
+    sizes = []
+    for term in terms:
+        if all(e == 0 for e in ring.field(term.element)):
+            continue
+        sizes += [ring.expression(c) for c in ring.terms(term.element, ring.state).values()]
     try:
-        flows = [
-            flow_of(ring, [t for t, c in zip(terms, colours, strict=True) if c == k]) for k in sorted(set(colours))
-        ]
-    except NoFlowError as error:
-        raise _refusal(system, error) from None
-    return Splitting(tuple(flows))
+        return sum(abs(v) for v in evaluate(sizes, values))
+    except (DomainError, KeyError):
+        return float("inf")
 
 
-def conflicts(ring: Ring, terms: list[Term]) -> list[set[int]]:
-    """For each term those that it does not commute with."""
-    found: list[set[int]] = [set() for _ in terms]
-    for i, a in enumerate(terms):
-        for j in range(i):
-            if not ring.commute(a.element, terms[j].element):
-                found[i].add(j)
-                found[j].add(i)
-    return found
+def _merged(ring: Ring, flows: list[Flow]) -> list[Flow]:
+    """Parts whose sum has linear equations with a closed form, taken together though they do not commute."""
+    for i, first in enumerate(flows):
+        for second in flows[i + 1 :]:
+            terms = [Term(f.hamiltonian, ring.tower.convert(f.hamiltonian)) for f in (first, second)]
+            found = joint_flow(ring, terms, linear=True)
+            if isinstance(found, Flow):
+                return _merged(ring, [found, *(f for f in flows if f not in (first, second))])
+    return flows
 
 
-def coloured(neighbours: list[set[int]]) -> list[int]:
-    """A colour for each node, from 0; neighbours differ."""
-    colours = [-1] * len(neighbours)
-    for _ in neighbours:
-        open_ = [i for i, c in enumerate(colours) if c < 0]
-        seen = {i: {colours[j] for j in neighbours[i]} - {-1} for i in open_}
-        i = max(open_, key=lambda i: (len(seen[i]), len(neighbours[i]), -i))
-        colours[i] = next(c for c in range(len(neighbours)) if c not in seen[i])
-    return colours
-
-
-def _refusal(system: System, error: NoFlowError) -> SpecError:
+def _refusal(system: System, error: NoFlowError | None) -> SpecError:
     place = system.locations.get(("hamiltonian",))
+    if error is None:
+        return SpecError([Diagnostic("scheme splitting: H has no terms", place)])
     message = f"scheme splitting: the term {text(error.term.expression)} has no elementary flow: {error.reason}"
     hint = "scheme: series takes every H; terms in coordinates that commute with one another always split"
     return SpecError([Diagnostic(message, place, hint)])

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
+from phigen.geometry.shapes import Matrix
 from phigen.geometry.system import System
 from phigen.symbolic.expression import Expression, number, symbol
 from phigen.symbolic.horner import horner
@@ -26,12 +27,12 @@ Monomial = tuple[int, ...]
 
 @dataclass(frozen=True)
 class Ring:
-    """A tower that holds a system, with its bracket."""
+    """A tower that holds a system, with its bracket; ``brackets`` is π as the system gives it."""
 
     tower: Tower
     coordinates: tuple[str, ...]
     poisson: tuple[tuple[Poly, ...], ...]
-    hamiltonian: Poly
+    brackets: Matrix
 
     @cached_property
     def state(self) -> tuple[int, ...]:
@@ -58,9 +59,28 @@ class Ring:
         """π∇g."""
         slope = {i: self.tower.derivative(g, self.coordinates[i]) for i in self.support(g)}
         return [
-            self.tower.combine(row[i] * d for i, d in slope.items() if (i, j) not in self.zero_pairs)
+            self.lowest(self.tower.combine(row[i] * d for i, d in slope.items() if (i, j) not in self.zero_pairs))
             for j, row in enumerate(self.poisson)
         ]
+
+    def lowest(self, element: Poly) -> Poly:
+        """The element with q·(1/q) cancelled where q is a polynomial that divides what stands beside 1/q."""
+        for g in self.tower.generators:
+            if g.kind != "reciprocal" or element == 0:
+                continue
+            own, q = self.tower.names.index(g.name), g.arguments[0]
+            pending, settled = [element], []
+            while pending:
+                powers = self.terms(pending.pop(), [own])
+                for monomial, coefficient in powers.items():
+                    quotient, rest = divmod(coefficient, q) if monomial[own] else (coefficient, 1)
+                    lower = (*monomial[:own], max(monomial[own] - 1, 0), *monomial[own + 1 :])
+                    if rest == 0:
+                        pending.append(quotient * self.monomial(lower))
+                    else:
+                        settled.append(coefficient * self.monomial(monomial))
+            element = self.tower.combine(settled)
+        return element
 
     def rate(self, element: Poly, field: Sequence[Poly]) -> Poly:
         """The derivative of an element along a vector field; 0 as a polynomial if it vanishes."""
@@ -69,7 +89,7 @@ class Ring:
             for j, c in enumerate(self.coordinates)
             if field[j] != 0 and self.tower.depends_on(element, [c])
         )
-        return self.tower.zero if self.tower.is_zero(found) else found
+        return self.tower.zero if self.tower.is_zero(found) else self.lowest(found)
 
     def commute(self, f: Poly, g: Poly) -> bool:
         """Whether {f, g} = 0, proved."""
@@ -112,4 +132,4 @@ def ring_of(system: System, more: Iterable[Expression] = ()) -> Ring:
     images = tower.convert_all(roots)
     n, start = system.dimension, 1 + len(listed)
     poisson = tuple(tuple(images[start + i * n : start + (i + 1) * n]) for i in range(n))
-    return Ring(tower, system.coordinates, poisson, images[0])
+    return Ring(tower, system.coordinates, poisson, system.poisson)

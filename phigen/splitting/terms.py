@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterable, Iterator
 
 from phigen.geometry.system import System
 from phigen.splitting.flow import Term
 from phigen.splitting.ring import Ring
 from phigen.symbolic.expression import ONE, Expression, neg, symbols_of, total
+from phigen.symbolic.tower import Poly
 
 
 def summands(e: Expression, coordinates: Collection[str], factor: Expression = ONE) -> Iterator[Expression]:
@@ -28,27 +29,42 @@ def _static(e: Expression, coordinates: Collection[str]) -> bool:
     return not any(s in coordinates for s in symbols_of(e))
 
 
-def terms_of(ring: Ring, listed: list[Expression]) -> list[Term]:
-    """The terms of H, those of the same coordinates together; a constant is left out.
+def hamiltonian_terms(system: System) -> list[Expression]:
+    """The summands of H."""
+    return list(summands(system.hamiltonian, system.coordinates))
+
+
+def terms_of(ring: Ring, listed: Iterable[Expression]) -> list[Term]:
+    """The terms of H, those of the same coordinates together.
 
     A summand of coordinates that do not commute is expanded in the ring, and its monomials are separate terms.
     """
-    groups: dict[tuple[int, ...], list[Term]] = {}
+    found: list[Term] = []
     for e in listed:
         element = ring.tower.convert(e)
         support = ring.support(element)
         if all((i, j) in ring.zero_pairs for i in support for j in support):
-            groups.setdefault(support, []).append(Term(e, element))
-            continue
-        for monomial, coefficient in ring.terms(element, ring.state).items():
-            part = coefficient * ring.monomial(monomial)
-            groups.setdefault(ring.support(part), []).append(Term(ring.expression(part), part))
-    groups.pop((), None)
+            found.append(Term(e, element))
+        else:
+            found += monomial_terms(ring, element)
+    return joined(ring, found)
+
+
+def monomial_terms(ring: Ring, element: Poly) -> list[Term]:
+    """The monomials of an element, each a term."""
+    parts = [c * ring.monomial(m) for m, c in ring.terms(element, ring.state).items()]
+    return [Term(ring.expression(part), part) for part in parts if not ring.tower.is_zero(part)]
+
+
+def joined(ring: Ring, terms: Iterable[Term]) -> list[Term]:
+    """Terms of the same coordinates together; constants go with the first of the others."""
+    groups: dict[tuple[int, ...], list[Term]] = {}
+    for term in terms:
+        groups.setdefault(ring.support(term.element), []).append(term)
+    constants = groups.pop((), [])
+    if constants and groups:
+        first = next(iter(groups))
+        groups[first] += constants
     return [
         Term(total(t.expression for t in part), ring.tower.combine(t.element for t in part)) for part in groups.values()
     ]
-
-
-def hamiltonian_terms(system: System) -> list[Expression]:
-    """The summands of H."""
-    return list(summands(system.hamiltonian, system.coordinates))

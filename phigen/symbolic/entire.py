@@ -2,8 +2,9 @@
 
 - ``cosroot``(s) = cos √s, ``sinroot``(s) = sin(√s)/√s: cosh and sinh where s < 0, one formula for rotations and
   hyperbolic motions alike; cosroot² + s·sinroot² = 1
+- ``arcroot``(s) = (√s − sin √s)/√s³
 - ``exprel``(s) = (e^s − 1)/s
-- ``sinroot1`` and ``exprel1`` are the derivatives of these two, which tangent maps need
+- ``sinroot1`` and ``exprel1`` are the derivatives of sinroot and exprel, which tangent maps need
 
 All are of phigen's own, and not accepted in a spec.
 """
@@ -55,6 +56,10 @@ def _sinroot1(library: Any, s: Any) -> Any:
     return (_cosroot(library, s) - _sinroot(library, s)) / (2 * s)
 
 
+def _arcroot(library: Any, s: Any) -> Any:
+    return (1 - _sinroot(library, s)) / s
+
+
 def _exprel(library: Any, s: Any) -> Any:
     return library.expm1(s) / s
 
@@ -86,6 +91,13 @@ ENTIRE: dict[str, Entire] = {
         "the derivative of sin(sqrt(s))/sqrt(s)",
         lambda n: (-1) ** (n + 1) * (n + 1) * _factorial(2 * n + 3),
         _sinroot1,
+        None,
+        1.0,
+    ),
+    "arcroot": Entire(
+        "(sqrt(s) - sin(sqrt(s)))/sqrt(s)**3, with sinh for negative s",
+        lambda n: (-1) ** n * _factorial(2 * n + 3),
+        _arcroot,
         None,
         1.0,
     ),

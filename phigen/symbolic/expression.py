@@ -42,6 +42,8 @@ FUNCTIONS: dict[str, int] = {
     "exp": 1,
     "expm1": 1,  # exp(a) − 1 without cancellation, of phigen's own, not accepted in a spec
     "versin": 1,  # 1 − cos(a) without cancellation, likewise
+    "log1p": 1,  # log(1 + a) without cancellation
+    "inv": 1,  # 1/a where a > 0, else not a number: beyond the pole of a flow there is no solution
     "log": 1,
     "sin": 1,
     "cos": 1,
@@ -62,7 +64,7 @@ FUNCTIONS: dict[str, int] = {
 } | dict.fromkeys((*SPECIAL, *ENTIRE), 1)  # of the exponential bi-realisation and of flows, not accepted in a spec
 
 #: Functions of phigen's own, which a spec cannot name.
-OWN = ("sign", "power", "expm1", "versin", *SPECIAL, *ENTIRE)
+OWN = ("sign", "power", "expm1", "versin", "log1p", "inv", *SPECIAL, *ENTIRE)
 
 _NODES: WeakValueDictionary[tuple[Any, ...], Expression] = WeakValueDictionary()
 _RANK = {"number": 0, "pi": 1, "E": 1, "symbol": 2}
@@ -450,6 +452,10 @@ def partials(e: Expression) -> list[Expression]:
             return [1 + e]
         case "versin":
             return [call("sin", a)]
+        case "log1p":
+            return [1 / (1 + a)]
+        case "inv":
+            return [-(e**2)]
         case "log":
             return [1 / a]
         case "sin":
@@ -485,6 +491,8 @@ def partials(e: Expression) -> list[Expression]:
             return [ZERO]
         case "phi0" | "phi1":
             return [call(SPECIAL[order_of(e.op) + 1], a)]
+        case "arcroot":
+            return [(call("sinroot", a / 4) ** 2 / 2 - 3 * e) / (2 * a)]
         case op if op in ENTIRE and (rule := ENTIRE[op].derivative):
             return [number(rule[0]) * call(rule[1], a)]
     raise ValueError(f"no derivative is known for {e.op}")

@@ -101,6 +101,12 @@ def _mpmath_context(digits: int) -> Any:
     return context
 
 
+def _inverse(value: Any) -> Any:
+    if value <= 0:
+        raise ValueError("inv of a value that is not positive")
+    return 1 / value
+
+
 def _visitor(
     values: Mapping[str, Any], convert: Callable[[Any], Any], library: Any, power: Callable[[Any, Any], Any]
 ) -> Callable[[Expression, list[Any]], Any]:
@@ -132,6 +138,8 @@ def _visitor(
             raise DomainError(f"{node.op} is not rational")
         if node.op == "versin":
             return 2 * library.sin(args[0] / 2) ** 2
+        if node.op == "inv":
+            return _inverse(args[0])
         if node.op in ("pi", "E"):
             return +getattr(library, node.op.lower())
         if node.op in entire.ENTIRE:

@@ -187,6 +187,10 @@ class Tower:
             return self.function("exp", args) - 1
         if name == "versin":
             return 1 - self.function("cos", args)
+        if name == "log1p":
+            return self.function("log", [1 + args[0]])
+        if name == "inv":
+            return self._reciprocal(args[0])
         first = args[0]
         if name in ENTIRE:
             return self._entire(name, first)
@@ -217,6 +221,9 @@ class Tower:
             inverse, exp = self._reciprocal(s), self.function("exp", [s])
             relative = (exp - 1) * inverse
             return relative if name == "exprel" else (exp - relative) * inverse
+        if name == "arcroot":  # by half angles, in which flows with it are written
+            quarter = s * self.constant(Fraction(1, 4))
+            return (1 - self._entire("sinroot", quarter) * self._entire("cosroot", quarter)) * self._reciprocal(s)
         cos, sin = self._generator("cosroot", [s]), self._generator("sinroot", [s])
         if name == "sinroot1":
             return (cos - sin) * self._reciprocal(s) * self.constant(Fraction(1, 2))
@@ -247,6 +254,13 @@ class Tower:
         if k < 0:
             return self._generator("root", [base], n, True) ** (-k)
         return base ** (k // n) * self._generator("root", [base], n, False) ** (k % n)
+
+    def inverse(self, base: Poly) -> Poly | None:
+        """1/base, if the tower has it."""
+        try:
+            return self._reciprocal(base)
+        except (_MissingError, ZeroDivisionError):
+            return None
 
     def _reciprocal(self, base: Poly) -> Poly:
         if base == 0:
@@ -304,6 +318,8 @@ class Tower:
 
     def depends_on(self, element: Poly, names: Iterable[str]) -> bool:
         """Whether some of the symbols occur, directly or inside a generator."""
+        if element == 0:  # whose degrees are −1
+            return False
         wanted = set(names)
         degrees = element.degrees()
         for i, n in enumerate(self.names):

@@ -53,11 +53,12 @@ _FAR = {
     "cosroot": "np.where(s > 0.0, np.cos(np.sqrt(np.abs(s))), np.cosh(np.sqrt(np.abs(s))))",
     "sinroot": "np.where(s > 0.0, np.sin(np.sqrt(np.abs(s))), np.sinh(np.sqrt(np.abs(s)))) / np.sqrt(np.abs(s))",
     "sinroot1": "(_cosroot(s) - _sinroot(s)) / (2.0 * s)",
+    "arcroot": "(1.0 - _sinroot(s)) / s",
     "exprel": "np.expm1(s) / s",
     "exprel1": "(np.exp(s) - _exprel(s)) / s",
 }
 #: What the closed form of a function calls.
-NEEDS = {"sinroot1": ("cosroot", "sinroot"), "exprel1": ("exprel",)}
+NEEDS = {"sinroot1": ("cosroot", "sinroot"), "arcroot": ("sinroot",), "exprel1": ("exprel",)}
 
 
 def entire_used(program: Program) -> list[str]:

@@ -50,10 +50,12 @@ def test_tangent_maps_need_no_second_derivatives():
 
 def test_the_ring_knows_their_relations():
     c, r, e = (call(n, s * t**2) for n in ("cosroot", "sinroot", "exprel"))
+    half, drift = call("sinroot", s * t**2 / 4), t**3 * call("arcroot", s * t**2)
     held = {
         "circle": c**2 + s * t**2 * r**2 - 1,
         "rotation": derivative(t * r, "t") - c,
         "and back": derivative(c, "t") + s * t * r,
+        "drift": derivative(drift, "t") - t**2 * half**2 / 2,
         "growth": s * t**2 * e - (call("exp", s * t**2) - 1),
         "its slope": derivative(e * t, "t") - 2 * call("exp", s * t**2) + e,
     }

@@ -27,6 +27,8 @@ ARGUMENTS |= {
     "log": (x,),
     "expm1": (y,),
     "versin": (y,),
+    "log1p": (-x,),
+    "inv": (y + z,),
     "abs": (y - z,),
     "sign": (x - y,),
 }

@@ -15,11 +15,12 @@ from phigen.targets.names import C_RESERVED, Scope
 from phigen.targets.printer import Printer
 
 _SAME: tuple[str, ...] = ("exp", "expm1", "log", "sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sinh", "cosh")
-_SAME += ("tanh", "asinh", "acosh", "atanh", "sqrt", "cbrt")
+_SAME += ("tanh", "asinh", "acosh", "atanh", "sqrt", "cbrt", "log1p")
 FUNCTIONS = {name: name for name in _SAME} | {
     "abs": "fabs",
     "power": "pow",
     "sign": "(double)(({0} > 0.0) - ({0} < 0.0))",
+    "inv": "({0} > 0.0 ? 1.0 / ({0}) : NAN)",
     "versin": "(2.0 * sin(0.5 * ({0})) * sin(0.5 * ({0})))",
 }
 # Digits, since -std=c99 hides M_PI.

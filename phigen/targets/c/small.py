@@ -39,6 +39,7 @@ _FAR = {
     "cosroot": "s > 0.0 ? cos(sqrt(s)) : cosh(sqrt(-s))",
     "sinroot": "s > 0.0 ? sin(sqrt(s)) / sqrt(s) : sinh(sqrt(-s)) / sqrt(-s)",
     "sinroot1": "({NAME}_cosroot(s) - {NAME}_sinroot(s)) / (2.0 * s)",
+    "arcroot": "(1.0 - {NAME}_sinroot(s)) / s",
     "exprel": "expm1(s) / s",
     "exprel1": "(exp(s) - {NAME}_exprel(s)) / s",
 }

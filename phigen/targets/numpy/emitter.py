@@ -33,9 +33,11 @@ FUNCTIONS = {
     "abs": "np.abs",
     "power": "np.power",
     "sign": "np.sign({0})",
+    "inv": "np.where({0} > 0.0, 1.0 / ({0}), np.nan)",
     "versin": "(2.0 * np.sin(0.5 * ({0})) ** 2)",
 } | {
-    name: f"np.{name}" for name in ["exp", "expm1", "log", "sin", "cos", "tan", "sinh", "cosh", "tanh", "sqrt", "cbrt"]
+    name: f"np.{name}"
+    for name in ["exp", "expm1", "log1p", "log", "sin", "cos", "tan", "sinh", "cosh", "tanh", "sqrt", "cbrt"]
 }
 CONSTANTS = {"pi": "np.pi", "E": "np.e"}
 

@@ -1,0 +1,67 @@
+"""Flows of one coordinate by itself: ż = r(z) with frozen coefficients, where r is not linear.
+
+- r = az² + bz + c: z + r T/(1 − (az + b/2)T), T = tanh(wt)/w with w² = b²/4 − ac, written with cosroot and sinroot
+- r' = kr: z − log(1 − krt)/k
+- zr' = nr: z(1 + (1 − n) t r/z)^{1/(1 − n)}
+
+Each ends where the solution becomes infinite; beyond, the increment is not a number, and the step fails.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from fractions import Fraction
+
+from phigen.splitting.exponential import Solution
+from phigen.splitting.ring import TIME, Ring
+from phigen.symbolic.expression import call, number, symbol
+from phigen.symbolic.tower import Poly, rational
+
+
+def solve(ring: Ring, i: int, rate: Poly, moving: Collection[int]) -> Solution | None:
+    """The increment of coordinate i, whose rate involves no other moving variables than functions of itself."""
+    name = ring.coordinates[i]
+    others = [ring.coordinates[j] for j in range(len(ring.coordinates)) if j != i]
+    if any(ring.tower.depends_on(ring.tower.gens[v], others) for v in _variables(ring, rate) if v in moving):
+        return None
+    return _quadratic(ring, name, rate, moving) or _exponential(ring, name, rate, moving) or _power(ring, name, rate)
+
+
+def _variables(ring: Ring, element: Poly) -> list[int]:
+    return [v for v, degree in enumerate(element.degrees()) if degree > 0]
+
+
+def _quadratic(ring: Ring, name: str, rate: Poly, moving: Collection[int]) -> Solution | None:
+    tower, own = ring.tower, ring.tower.names.index(name)
+    terms: dict[int, Poly] = {m[own]: c for m, c in ring.terms(rate, [own]).items()}
+    if max(terms) > 2 or any(v in moving for c in terms.values() for v in _variables(ring, c)):
+        return None
+    zero: Poly = tower.zero
+    a, b, c = (terms.get(k, zero) for k in (2, 1, 0))
+    half = tower.constant(Fraction(1, 2))
+    turning = tower.combine([a * c, tower.constant(Fraction(-1, 4)) * b * b])  # −w²
+    t, z = symbol(TIME), tower.variable(name)
+    s = ring.expression(tower.combine([turning * tower.variable(TIME) ** 2]))
+    speed, cosine = t * call("sinroot", s), call("cosroot", s)
+    slope = ring.expression(tower.combine([a * z, half * b]))
+    increment = ring.expression(rate) * speed * call("inv", cosine - speed * slope)
+    return Solution((increment,), "moved by a Riccati equation")
+
+
+def _exponential(ring: Ring, name: str, rate: Poly, moving: Collection[int]) -> Solution | None:
+    k, rest = divmod(ring.tower.derivative(rate, name), rate)
+    if rest != 0 or any(v in moving for v in _variables(ring, k)):
+        return None
+    factor = ring.expression(k)
+    grown = ring.expression(ring.tower.combine([k * rate * ring.tower.variable(TIME)]))
+    return Solution((-call("log1p", -grown) / factor,), "moved by a logarithm")
+
+
+def _power(ring: Ring, name: str, rate: Poly) -> Solution | None:
+    n, rest = divmod(ring.tower.derivative(rate, name) * ring.tower.variable(name), rate)
+    if rest != 0 or not n.is_constant() or n == 1:
+        return None
+    degree = rational(n.leading_coefficient()) if n != 0 else Fraction(0)
+    exponent, z = number(1 - degree), symbol(name)
+    grown = exponent * (symbol(TIME) * (ring.expression(rate) / z))
+    return Solution((z * call("expm1", call("log1p", grown) / exponent),), "moved by a power")
