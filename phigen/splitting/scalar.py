@@ -36,8 +36,8 @@ def _quadratic(ring: Ring, name: str, rate: Poly, moving: Collection[int]) -> So
     terms: dict[int, Poly] = {m[own]: c for m, c in ring.terms(rate, [own]).items()}
     if max(terms) > 2 or any(v in moving for c in terms.values() for v in _variables(ring, c)):
         return None
-    zero: Poly = tower.zero
-    a, b, c = (terms.get(k, zero) for k in (2, 1, 0))
+    padded: dict[int, Poly] = dict.fromkeys((2, 1, 0), tower.zero) | terms
+    a, b, c = (padded[k] for k in (2, 1, 0))
     half = tower.constant(Fraction(1, 2))
     turning = tower.combine([a * c, tower.constant(Fraction(-1, 4)) * b * b])  # −w²
     t, z = symbol(TIME), tower.variable(name)
