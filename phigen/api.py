@@ -22,7 +22,9 @@ from phigen.spec.model import Extras, Spec
 from phigen.spec.names import IDENTIFIER, KEYWORDS, SCHEMES, SPEC_NAME
 
 if TYPE_CHECKING:
+    from phigen.runtime.interface import Interface
     from phigen.runtime.solver import Solver
+    from phigen.scheme.program import Program
 
 #: What `compile` takes.
 Source = str | PathLike[str] | Spec | System | Compilation
@@ -91,19 +93,11 @@ def compilation_of(
 def solver_of(compilation: Compilation, target: str = "auto") -> Solver:
     """The loaded solver of a compilation. Raises `ToolchainError` if C was asked for and cannot be compiled."""
     from phigen.runtime.c_solver import CSolver
-    from phigen.runtime.interface import Backend, Interface
+    from phigen.runtime.interface import Backend
     from phigen.runtime.numpy_solver import NumpySolver
     from phigen.runtime.solver import Solver
 
-    program = compilation.program
-    interface = Interface(
-        name=program.name,
-        coordinates=program.coordinates,
-        order=program.order,
-        parameters={p.name: float(p.value) for p in program.parameters},
-        positive=frozenset(p.name for p in program.parameters if p.positive),
-        casimirs=program.casimirs,
-    )
+    program, interface = compilation.program, interface_of(compilation.program)
     target = chosen_target(target)
     files = emit(program, target, f"phigen build {program.name}.yaml")
     backend: Backend
@@ -112,6 +106,20 @@ def solver_of(compilation: Compilation, target: str = "auto") -> Solver:
     else:
         backend = NumpySolver.from_source(files[f"{program.name}.py"], interface)
     return Solver(backend, interface)
+
+
+def interface_of(program: Program) -> Interface:
+    """The names of a program, as the runtime needs them."""
+    from phigen.runtime.interface import Interface
+
+    return Interface(
+        name=program.name,
+        coordinates=program.coordinates,
+        order=program.order,
+        parameters={p.name: float(p.value) for p in program.parameters},
+        positive=frozenset(p.name for p in program.parameters if p.positive),
+        casimirs=program.casimirs,
+    )
 
 
 def chosen_target(target: str) -> str:

@@ -11,7 +11,14 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from phigen.analysis.arrays import Floats
-from phigen.analysis.drawing import error_curves, exponents, phase_space, precision_curves, section_plane
+from phigen.analysis.drawing import (
+    error_curves,
+    exponents,
+    phase_space,
+    precision_curves,
+    section_plane,
+    tuning_curves,
+)
 from phigen.analysis.drawing.palette import PALETTE, SUFFIXES, save, styled, svg
 from phigen.analysis.precision import Study
 from phigen.runtime.trajectory import Trajectory
@@ -21,9 +28,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure, FigureBase
 
     from phigen.analysis.lyapunov import Spectrum
+    from phigen.analysis.tuning.study import Tuning
 
 __all__ = ["PALETTE", "SUFFIXES", "WIDTH", "convergence_figure", "error_figure", "lyapunov_figure", "run_figure",
-           "save", "section_figure", "svg", "trajectory_figure", "work_precision_figure"]  # fmt: skip
+           "save", "section_figure", "svg", "trajectory_figure", "tuning_figure", "work_precision_figure"]  # fmt: skip
 
 #: The widths of a page and of a single panel, in inches; PNG files have 200 dots per inch.
 WIDTH, NARROW = 7.2, 4.8
@@ -78,6 +86,16 @@ def work_precision_figure(study: Study) -> Figure:
     figure = _figure(_SQUARE, WIDTH if len(panels) > 1 else NARROW)
     for axes, draw in zip(figure.subplots(1, len(panels), squeeze=False)[0], panels, strict=True):
         draw(axes, study)
+    return figure
+
+
+@styled
+def tuning_figure(found: Tuning, title: str = "") -> Figure:
+    """The error of all candidates of a tuning against the time they take, and what was proposed."""
+    figure = _figure(1.2 * _SQUARE, WIDTH)
+    if title:
+        figure.suptitle(title, fontsize=11)
+    tuning_curves.draw_tuning(figure.add_subplot(), found)
     return figure
 
 

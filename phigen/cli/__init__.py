@@ -24,6 +24,7 @@ COMMANDS = {
     "build": ("phigen.cli.build", "Write the C and NumPy solvers of specs."),
     "run": ("phigen.cli.run", "Integrate an experiment of a spec and sum up what was conserved."),
     "vendor": ("phigen.cli.vendor", "Copy solvers into another project, and check them there."),
+    "tune": ("phigen.cli.tune", "Find the cheapest setting and step for an accuracy."),
     "verify": ("phigen.cli.verify", "Build every target and measure what the solvers promise."),
     "show": ("phigen.cli.show", "Show the formulas: π, Casimirs, α, β, S_1 … S_k."),
     "list": ("phigen.cli.list", "List the bundled specs."),

@@ -1,0 +1,96 @@
+"""The solution to compare orbits with: by two methods of different kinds, trusted as far as these agree."""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from phigen.analysis.arrays import Floats
+from phigen.analysis.tuning.trials import MARKS, Method
+from phigen.errors import CheckError
+
+#: Steps are halved until that changes no more than this part of the accuracy.
+CONVERGED = 0.02
+#: The two may differ by this part of the accuracy.
+AGREED = 0.2
+_HALVINGS = 16
+
+
+@dataclass
+class Reference:
+    """The solution by one method at a step of at most ``step``: states (count + 1, DIM) at multiples of any spacing.
+
+    ``uncertainty`` is the distance of the other method, relative to the largest coordinate.
+    """
+
+    method: Method
+    step: float
+    uncertainty: float
+    _known: dict[tuple[float, int], Floats] = field(default_factory=dict)
+
+    def __call__(self, spacing: float, count: int) -> Floats:
+        key = (spacing, count)
+        if key not in self._known:
+            stride = math.ceil(spacing / self.step)
+            found = self.method.rows(spacing / stride, stride * count, stride)
+            if found is None:
+                raise CheckError(f"the reference solution cannot be followed to t = {spacing * count:.6g}")
+            self._known[key] = found
+        return self._known[key]
+
+
+def agreed(first: Method, second: Method, step: float, span: float, accuracy: float, seconds: float) -> Reference:
+    """The reference over a time span by the first method, confirmed by the second.
+
+    ``accuracy`` is the error that is to be measured, relative to the largest coordinate; each method may take so many
+    ``seconds``. Raises `CheckError` if the two do not agree well enough to measure that error.
+    """
+    spacing = span / MARKS
+    found = []
+    for method in (first, second):
+        converged = _converged(method, min(step, spacing), spacing, accuracy, time.perf_counter() + seconds)
+        if converged is None:
+            raise CheckError(f"no reference solution: a method fails before t = {span:.6g}")
+        found.append(converged)
+    (states, h), (others, _) = found
+    difference = distance(states, others)
+    if difference > AGREED * accuracy:
+        size = float(np.max(np.abs(others))) or 1.0
+        apart = np.max(np.abs(states - others), axis=1) > AGREED * accuracy * size
+        raise CheckError(
+            f"no reference solution for the orbit: an error of {accuracy:.1e} is to be measured, but two methods at "
+            f"small steps agree to that only up to t = {spacing * int(np.argmax(apart)):.4g} of {span:.6g}\n"
+            "  hint: chaotic motion and rounding both do that; ask for a shorter --horizon or less accuracy, or "
+            "let --measure be energy"
+        )
+    return Reference(first, h, difference)
+
+
+def distance(states: Floats, others: Floats) -> float:
+    """The largest difference of states (rows, DIM), relative to the largest coordinate."""
+    return float(np.max(np.abs(states - others))) / (float(np.max(np.abs(others))) or 1.0)
+
+
+def _converged(
+    method: Method, step: float, spacing: float, accuracy: float, until: float
+) -> tuple[Floats, float] | None:
+    """States at a step where halving it changes nothing that counts, or no less than before."""
+    last: Floats | None = None
+    best: tuple[Floats, float] | None = None
+    change = math.inf
+    for k in range(_HALVINGS):
+        stride = max(1, math.ceil(spacing / step * 2.0**k))
+        states = method.rows(spacing / stride, stride * MARKS, stride)
+        if states is None:
+            continue
+        if last is not None:
+            before, change = change, distance(last, states)
+            if change > before and best is not None:
+                break
+        best, last = (states, spacing / stride), states
+        if change <= CONVERGED * accuracy or time.perf_counter() > until:
+            break
+    return best

@@ -1,0 +1,102 @@
+"""``phigen tune``: measure the settings of a spec, and propose the cheapest that is accurate enough."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from phigen.cli.console import Console, out, pass_console, verbosity
+from phigen.cli.experiment import prepared
+from phigen.cli.sources import load_one, one_spec
+from phigen.cli.tune_summary import described, print_tuning, unreached
+from phigen.errors import CheckError
+
+if TYPE_CHECKING:
+    from phigen.analysis.tuning.trials import Problem
+    from phigen.cli.experiment import Experiment
+    from phigen.geometry.system import System
+
+_PLOTS = (".png", ".svg", ".pdf")
+
+
+@click.command("tune")
+@one_spec
+@click.option("--run", "name", metavar="NAME", help="Which run of the spec.  [default: the first]")
+@click.option(
+    "--accuracy", type=click.FloatRange(1e-15, 0.5), default=1e-8, show_default=True, metavar="E",
+    help="The largest error that is allowed, relative.",
+)  # fmt: skip
+@click.option(
+    "--measure", type=click.Choice(["energy", "orbit"]), default="energy", show_default=True,
+    help="Error of the energy on the way, or distance from a reference solution.",
+)  # fmt: skip
+@click.option("--horizon", type=float, metavar="T", help="How long a run is.  [default: as in the spec]")
+@click.option("--set", "settings", metavar="NAME=VALUE", multiple=True, help="A parameter, or an initial coordinate.")
+@click.option("--budget", type=float, default=60.0, show_default=True, metavar="SECONDS", help="How long to search.")
+@click.option("--plot", metavar="FILE", help="Draw error against time: FILE.png, .svg or .pdf.")
+@click.option("--json", "as_json", is_flag=True, help="For machines: everything that was measured.")
+@verbosity
+@pass_console
+def command(
+    console: Console,
+    spec_file: str,
+    name: str | None,
+    accuracy: float,
+    measure: str,
+    horizon: float | None,
+    settings: tuple[str, ...],
+    budget: float,
+    plot: str | None,
+    as_json: bool,
+) -> None:
+    """Find the cheapest bi-realisation, order, gauge, composition and step for an accuracy.
+
+    Builds candidates, compiles them as C, measures the error and the time of each over a piece of a run of the spec,
+    confirms the best ones over the whole horizon if that is affordable, and prints the lines to paste into the spec.
+    Classical methods in C stand beside them. Exit code 5 if nothing reaches the accuracy.
+    """
+    from phigen.analysis.proof import compile_proved
+    from phigen.analysis.tuning.study import tune
+
+    _expect_positive(horizon, "--horizon")
+    _expect_positive(budget, "--budget")
+    if plot and Path(plot).suffix.lower() not in _PLOTS:
+        raise click.BadParameter(f"{plot!r} must end in {', '.join(_PLOTS)}", param_hint="--plot")
+    spec = load_one(spec_file)
+    experiment = prepared(spec, name, settings=settings)
+    compilation = compile_proved(spec)
+    problem = problem_of(compilation.system, experiment, horizon)
+    found = tune(compilation, problem, measure, accuracy, budget, console.note)
+    if plot:
+        from phigen.analysis import figures
+
+        figures.save(figures.tuning_figure(found, f"{spec.name}, run {experiment.run.name}"), plot)
+        console.note(f"wrote {plot}")
+    if as_json:
+        out(json.dumps(described(found, spec, experiment.run), indent=2, ensure_ascii=False))
+    elif found.winner:
+        print_tuning(found, spec, experiment.run)
+    if not found.winner:
+        raise CheckError(unreached(found))
+
+
+def _expect_positive(value: float | None, option: str) -> None:
+    if value is not None and not (value > 0 and math.isfinite(value)):
+        raise click.BadParameter(f"{value!r} is not a positive number", param_hint=option)
+
+
+def problem_of(system: System, experiment: Experiment, horizon: float | None) -> Problem:
+    """The initial value problem of an experiment, over its own duration unless another is given."""
+    import numpy as np
+
+    from phigen.analysis.tuning.trials import Problem
+
+    run = experiment.run
+    step = float(run.step)
+    span = abs(step) * run.steps if horizon is None else horizon
+    start = np.array(experiment.initial)
+    return Problem(system, start, experiment.parameters, min(abs(step), span), span, math.copysign(1.0, step))

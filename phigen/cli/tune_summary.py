@@ -1,0 +1,214 @@
+"""What ``phigen tune`` tells: a table and the lines to paste, or plain data."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from phigen.cli.console import heading, out, table
+from phigen.cli.run_summary import finite
+
+if TYPE_CHECKING:
+    from phigen.analysis.tuning.search import Curve
+    from phigen.analysis.tuning.study import Finalist, Tuning
+    from phigen.spec.model import Run, Spec
+
+#: Other accuracies that are told, as factors.
+_OTHERS = (1e4, 1e2, 1e-2, 1e-4)
+#: An error so much below the accuracy did not decide the step.
+_SLACK = 20
+
+
+def print_tuning(found: Tuning, spec: Spec, run: Run) -> None:
+    """The table, what it rests on, and the lines to paste."""
+    what = "energy error" if found.measure == "energy" else "error of the orbit"
+    out(
+        heading(f"{spec.name}, run {run.name}") + f": {what} at most {found.accuracy:g} up to t = {found.horizon:.9g}\n"
+    )
+    rows = [["", "order", "gauge", "scheme", "step", "error", "ns/step", "ms/unit time", "ratio"]]
+    rows += [_row(f, label, found) for label, f in listed(found)]
+    for line in table(rows, right=[1, 4, 5, 6, 7, 8]):
+        out(f"  {line}")
+    out("")
+    for remark in remarks(found):
+        out(f"  {remark}")
+    if others := _other_rows(found):
+        out("")
+        for line in table([["by the scans, for", "error", "step", "ms/unit time"], *others], right=[1, 2, 3]):
+            out(f"  {line}")
+    assert found.winner is not None
+    out("\nTo paste into the spec, instead of lines with the same keys" + (" and of terms:\n" if spec.terms else ":\n"))
+    out("\n".join(lines_of(found.winner)))
+    out(f"\nand into its run {run.name}:\n")
+    out("\n".join(f"    {line}" for line in run_lines_of(found.winner, run)))
+
+
+def listed(found: Tuning) -> Iterator[tuple[str, Finalist]]:
+    """All rows of the table with their labels."""
+    for finalist in found.finalists:
+        yield finalist.curve.label + (", the spec's" if finalist is found.own else ""), finalist
+    for peer in found.peers:
+        yield peer.curve.label, peer
+    if found.present:
+        yield "the spec and its run as they are", found.present
+
+
+def _row(finalist: Finalist, label: str, found: Tuning) -> list[str]:
+    curve, point, best = finalist.curve, finalist.point, found.winner
+    assert best is not None
+    cells = [label, str(curve.order), gauge_of(curve), scheme_of(curve), f"{point.step:.6g}"]
+    error = f"{point.error:.1e}" if is_measured(finalist, found) else f"~{point.error:.1e}"
+    ratio = finalist.cost / best.cost
+    times = [f"{1e9 * finalist.cost * point.step:.0f}", f"{1e3 * finalist.cost:.3g}"]
+    return [*cells, error, *times, f"{ratio:.2f}" if ratio < 100 else f"{ratio:.0f}"]
+
+
+def is_measured(finalist: Finalist, found: Tuning) -> bool:
+    """Whether the error was measured over the horizon, and not extrapolated."""
+    return finalist.point.time > min(0.99 * found.horizon, found.horizon - finalist.point.step)
+
+
+def gauge_of(curve: Curve) -> str:
+    """The gauge that a method has."""
+    if curve.setting is None:
+        return ""
+    return curve.setting.gauge if curve.gauged else "none"
+
+
+def scheme_of(curve: Curve) -> str:
+    """How the order is reached."""
+    from phigen.scheme import alternation
+
+    if curve.setting is None:
+        return "explicit"
+    composition = curve.setting.composition
+    if curve.stages == 0:
+        return "exact flow"
+    if curve.setting.is_splitting and composition == "auto":
+        found = alternation.find(composition, curve.order)
+        composition = found.name if found else composition
+    return f"{composition}, {curve.stages} stages" if composition not in ("none", "auto") else "direct"
+
+
+def remarks(found: Tuning) -> Iterator[str]:
+    """What the numbers rest on, and what they do not say."""
+    best = found.winner
+    assert best is not None
+    over, whole = best.point.time, found.horizon
+    yield f"A run up to t = {whole:.6g} takes {_seconds(best.cost * whole)} of CPU time."
+    if is_measured(best, found):
+        yield "Errors were measured up to there" + _extrapolated(found)
+    elif found.measure == "energy":
+        yield f"Errors were measured up to t = {over:.4g}. Beyond, phigen's stay bounded but for rounding (~)."
+    else:
+        yield f"Errors were measured up to t = {over:.4g}; phigen's grow linearly, and so does ~ up to t = {whole:.6g}."
+    if best.point.error * _SLACK < found.accuracy and best.point.step > 0.9 * best.curve.largest:
+        yield "The accuracy would allow a larger step, but none can be made, or it would not show the motion."
+        if found.measure == "energy":
+            yield "How exact the orbit is, the energy does not tell here: see --measure orbit."
+    for setting, why in found.refused.items():
+        yield f"Not measured: {setting.described()}: {why}."
+    if not found.finished:
+        yield "The budget ended before all promising candidates were tried; --budget takes more seconds."
+
+
+def _extrapolated(found: Tuning) -> str:
+    rest = [label for label, f in listed(found) if not is_measured(f, found)]
+    return f"; those with ~ are extrapolated ({', '.join(rest)})." if rest else "."
+
+
+def _seconds(value: float) -> str:
+    return f"{value:.3g} s" if value >= 1 else f"{1e3 * value:.3g} ms"
+
+
+def _other_rows(found: Tuning) -> list[list[str]]:
+    """The cheapest candidate at other accuracies, those that the scans reached."""
+    from phigen.analysis.tuning.search import cheapest_step
+
+    rows = []
+    for accuracy in (found.accuracy * factor for factor in _OTHERS):
+        curves = [c for c in found.curves if c.setting and any(p.error <= accuracy for p in c.points)]
+        curve = min(curves, key=lambda c: c.cost(accuracy), default=None)
+        step, cost = cheapest_step(curve.points, accuracy, curve.order) if curve else (0.0, math.inf)
+        if curve and math.isfinite(cost):
+            rows.append([curve.title, f"{accuracy:.0e}", f"{step:.2g}", f"{1e-6 * cost:.2g}"])
+    return rows
+
+
+def lines_of(finalist: Finalist) -> list[str]:
+    """The top-level lines of a spec that give what was measured."""
+    setting = finalist.curve.setting
+    assert setting is not None
+    return replace(setting, order=finalist.curve.order).lines()
+
+
+def run_lines_of(finalist: Finalist, run: Run) -> list[str]:
+    """The lines of the run, which covers the time that it covered before."""
+    step = math.copysign(finalist.point.step, run.step)
+    return [f"step: {step!r}", f"steps: {max(1, round(float(run.step) * run.steps / step))}"]
+
+
+def unreached(found: Tuning) -> str:
+    """Why nothing reaches the accuracy, and how near to it one came."""
+    from phigen.analysis.tuning.search import at_floor
+
+    curve, point = found.closest
+    told = curve.title
+    if point.rounding > found.accuracy or any(at_floor(c.points) for c in found.curves if c.setting):
+        why = "smaller steps do not help: what is left is rounding"
+        hint = "ask for less accuracy" + (" or a shorter --horizon" if point.error > 2 * point.measured else "")
+    else:
+        why = "smaller steps would take longer than the budget allows"
+        hint = "a larger --budget, or less accuracy"
+    return (
+        f"no setting reaches {found.accuracy:g} up to t = {found.horizon:.6g}: the smallest error is {point.error:.1e} "
+        f"({told}, step {point.step:.3g}); {why}\n  hint: {hint}"
+    )
+
+
+def described(found: Tuning, spec: Spec, run: Run) -> dict[str, Any]:
+    """Everything that was measured, as plain data."""
+    data: dict[str, Any] = {
+        "name": spec.name,
+        "run": run.name,
+        "measure": found.measure,
+        "accuracy": found.accuracy,
+        "horizon": found.horizon,
+        "scanned": found.piece,
+        "finished": found.finished,
+        "winner": _finalist(found.winner) if found.winner else None,
+        "lines": lines_of(found.winner) if found.winner else [],
+        "run_lines": run_lines_of(found.winner, run) if found.winner else [],
+        "finalists": [_finalist(f) for f in found.finalists],
+        "classical": [_finalist(f) for f in found.peers],
+        "present": _finalist(found.present) if found.present else None,
+        "curves": [_curve(c) for c in found.curves],
+        "not_measured": {s.described(): why for s, why in found.refused.items()},
+    }
+    cleaned: dict[str, Any] = finite(data)
+    return cleaned
+
+
+def _finalist(f: Finalist) -> dict[str, Any]:
+    point = f.point
+    return {
+        **_method(f.curve),
+        "step": point.step,
+        "error": point.error,
+        "measured_error": point.measured,
+        "measured_until": point.time,
+        "nanoseconds_per_step": 1e9 * f.cost * point.step,
+        "seconds_per_unit_time": f.cost,
+        "rounds": list(f.seconds),
+    }
+
+
+def _curve(curve: Curve) -> dict[str, Any]:
+    keys = ("step", "error", "measured", "time", "nanoseconds")
+    return {**_method(curve), "points": [{key: getattr(p, key) for key in keys} for p in curve.points]}
+
+
+def _method(curve: Curve) -> dict[str, Any]:
+    return {"method": curve.label, "order": curve.order, "gauge": gauge_of(curve), "scheme": scheme_of(curve)}

@@ -1,0 +1,86 @@
+"""``phigen tune`` as a user meets it: its lines, pasted into the spec, give what it promised."""
+
+import json
+import re
+import shutil
+from pathlib import Path
+
+import pytest
+
+from phigen import resources
+
+SPECS = resources.bundled_specs()
+
+pytestmark = pytest.mark.skipif(not shutil.which("cc"), reason="times compiled C")
+
+
+def paste(source, found):
+    """The spec with the proposed lines."""
+    keys = "|".join(["terms", *(line.split(":")[0] for line in found["lines"])])
+    head = re.sub(rf"(?m)^({keys}):.*\n(?:[ \t]+.*\n)*", "", source)
+    for line in found["run_lines"]:
+        head = re.sub(rf"(?m)^    {line.split(':')[0]}: .*$", f"    {line}", head)
+    return head + "\n".join(found["lines"]) + "\n"
+
+
+def test_pasted_lines_reach_the_accuracy_at_the_proposed_step(phigen, in_tmp):
+    path = SPECS / "henon_heiles.yaml"
+    done = phigen("tune", path, "--accuracy", "1e-6", "--horizon", "500", "--budget", "6", "--json", "--plot", "w.svg")
+    assert done.exit_code == 0, done.stderr
+    found = json.loads(done.stdout)
+    best = found["winner"]
+    assert best["error"] <= 1e-6
+    assert best["seconds_per_unit_time"] <= 1.05 * min(f["seconds_per_unit_time"] for f in found["finalists"])
+    assert {c["method"] for c in found["classical"]} <= {"RK4 in C", "DOP853 in C"}
+    assert "Hénon" not in done.stdout
+    text = paste(path.read_text(encoding="utf-8"), found)
+    Path("henon_heiles.yaml").write_text(text, encoding="utf-8")
+    run = json.loads(phigen("run", "henon_heiles.yaml", "--steps", round(500 / best["step"]), "--json").stdout)
+    assert (run["step"], run["order"]) == (best["step"], best["order"])
+    own = run["methods"][0]
+    assert own["energy"]["error"] == pytest.approx(best["measured_error"], rel=0.05)
+    assert "up to t = 500" in Path("w.svg").read_text(encoding="utf-8")
+
+
+def test_table_names_the_proposal_and_the_lines(phigen):
+    done = phigen("tune", SPECS / "harmonic_oscillator.yaml", "--measure", "orbit", "--budget", "3", "-q")
+    assert done.exit_code == 0, done.stderr
+    assert "error of the orbit at most 1e-08" in done.stdout
+    assert re.search(r"(?m)^order: \d+$", done.stdout)
+    assert re.search(r"(?m)^    step: ", done.stdout)
+    assert done.stderr == ""
+
+
+def test_accuracy_beyond_rounding_is_not_reached_and_that_is_explained(phigen):
+    done = phigen(
+        "tune", SPECS / "henon_heiles.yaml", "--accuracy", "1e-15", "--horizon", "1e6", "--budget", "3", "--json"
+    )
+    assert done.exit_code == 5
+    assert json.loads(done.stdout)["winner"] is None
+    assert "no setting reaches 1e-15 up to t = 1e+06" in done.stderr
+    assert "rounding" in done.stderr
+
+
+def test_chaotic_orbits_have_no_reference_over_long_times(phigen):
+    done = phigen("tune", SPECS / "henon_heiles.yaml", "--run", "chaotic", "--measure", "orbit", "--budget", "3")
+    assert done.exit_code == 5
+    assert "chaotic" in done.stderr
+    assert "--measure energy" in done.stderr or "--measure be energy" in done.stderr
+
+
+def test_run_beyond_the_end_of_its_solution_is_explained(phigen):
+    done = phigen("tune", SPECS / "lotka_volterra.yaml", "--horizon", "1", "--budget", "3")
+    assert done.exit_code == 7
+    assert "ends at t = 0.25538" in done.stderr
+
+
+@pytest.mark.parametrize(
+    "wrong", [["--accuracy", "0"], ["--horizon", "-1"], ["--budget", "nan"], ["--plot", "x.gif"], ["--run", "none"]]
+)
+def test_wrong_usage(phigen, wrong):
+    assert phigen("tune", SPECS / "henon_heiles.yaml", *wrong).exit_code == 2
+
+
+def test_without_compiler_there_is_nothing_to_time(phigen, monkeypatch):
+    monkeypatch.setenv("CC", "/there/is/none")
+    assert phigen("tune", SPECS / "henon_heiles.yaml").exit_code == 6
