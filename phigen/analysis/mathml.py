@@ -22,6 +22,9 @@ from phigen.symbolic.expression import Expression, fold, natural_key
 #: Characters of markup beyond which a part of a formula is left out; what is shared should have a name by then.
 LONGEST = 60_000
 
+#: Polynomials of more terms keep their order, even if it begins with a minus.
+FEW = 4
+
 #: An exponent longer than this makes exp(…) of a power of e.
 _LONG_EXPONENT = 250
 
@@ -91,6 +94,8 @@ class Term:
         c = abs(self.coefficient)
         top, bottom = (c, Fraction(1)) if _is_decimal(c) else (Fraction(c.numerator), Fraction(c.denominator))
         above = _product(top, self.above)
+        if len(self.above) == 1 and self.above[0].terms and "<mfrac" in above and not self.below and bottom != 1:
+            return _row(number(top / bottom) + _TIMES + self.above[0].markup)  # no fraction in a fraction
         return f"<mfrac>{above}{_product(bottom, self.below)}</mfrac>" if self.below or bottom != 1 else above
 
 
@@ -107,7 +112,8 @@ def terms_of_formula(formula: Formula) -> Sum:
     found: list[Term] = []
     for c, monomial in formula.terms:
         found += _times((Term(c),), *(_power(terms_of(base), exponent) for base, exponent in monomial))
-    return (*found, *_one(Factor(_DOTS))) if formula.hidden else tuple(found)
+    shown = _positive_first(found) if len(found) <= FEW else tuple(found)
+    return (*shown, *_one(Factor(_DOTS))) if formula.hidden else shown
 
 
 def expression(e: Expression) -> str:
@@ -147,6 +153,12 @@ def name(identifier: str) -> str:
     return _name(identifier).markup
 
 
+def dotted(identifier: str) -> str:
+    """The derivative of a name by the time, with the dot over its letter."""
+    factor = _name(identifier)
+    return replace(factor, base=f'<mover accent="true">{factor.base}<mo>˙</mo></mover>').markup
+
+
 def number(value: Fraction) -> str:
     """A number ≥ 0; a decimal of many digits stays one."""
     if value.denominator == 1:
@@ -156,6 +168,12 @@ def number(value: Fraction) -> str:
     digits = next(k for k in range(1, 1000) if (value * 10**k).denominator == 1)
     written = str(int(value * 10**digits)).rjust(digits + 1, "0")
     return f"<mn>{written[:-digits]}.{written[-digits:]}</mn>"
+
+
+def grouped(e: Expression) -> str:
+    """An expression as a factor: in parentheses if it is a sum or negative."""
+    terms = terms_of(e)
+    return summed(terms) if len(terms) == 1 and terms[0].coefficient > 0 else _parentheses(summed(terms))
 
 
 def matrix(rows: Sequence[Sequence[Expression]]) -> str:
@@ -288,9 +306,15 @@ def _sorted(terms: Sum) -> Sum:
     """Monomials in the order of their names, as people write them; then other terms, in the order given; one number."""
     constant = sum((t.coefficient for t in terms if not (t.above or t.below)), Fraction(0))
     rest = sorted((t for t in terms if t.above or t.below), key=lambda t: _key((*t.above, *t.below)))
-    if constant == 0:
-        return _bounded(tuple(rest))
-    return _bounded((Term(constant), *rest) if constant > 0 else (*rest, Term(constant)))
+    if constant > 0:
+        return _bounded((Term(constant), *rest))
+    return _bounded(_positive_first([*rest, Term(constant)] if constant else rest))
+
+
+def _positive_first(terms: list[Term]) -> Sum:
+    """The first positive term moved to the front: b − a rather than −a + b."""
+    place = next((i for i, t in enumerate(terms) if t.coefficient > 0), 0)
+    return (*terms[place : place + 1], *terms[:place], *terms[place + 1 :])
 
 
 def _key(factors: Sequence[Factor]) -> tuple[Any, ...]:

@@ -65,6 +65,8 @@ def observed_order(method: Method, reference: Callable[[float], tuple[Floats, fl
 class Drift:
     """The largest error of a conserved quantity in each of `WINDOWS` equal parts of a trajectory, relative to its size.
 
+    A trajectory of fewer steps has one part for each.
+
     The size at a state is Σ |x_i ∂_i C|, at least |C|: what rounding of the coordinates alone amounts to.
     """
 
@@ -92,7 +94,8 @@ def drifts(
         size = np.maximum(np.abs(value[0]), sum(abs(rows[:, i] * g) for i, g in enumerate(slopes)))
         size = np.maximum(size, size[0])
         error = np.abs(value - value[0]) / np.where(size > 0, size, 1.0)
-        found[name] = Drift(tuple(float(np.max(part)) for part in np.array_split(error[1:], WINDOWS)))
+        windows = np.array_split(error[1:], min(WINDOWS, len(error) - 1))
+        found[name] = Drift(tuple(float(np.max(part)) for part in windows))
     return found
 
 

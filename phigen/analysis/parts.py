@@ -11,6 +11,9 @@ from phigen.symbolic.expression import Expression, fold, raw, symbol, topologica
 #: What has fewer leaves than this gets no name of its own, nor what saves fewer leaves.
 SMALL, WORTH = 3, 4
 
+#: Names for shared parts of all expressions must make the whole so much shorter.
+WORTH_NAMES = 0.75
+
 #: Expressions with fewer leaves are written as they stand, or expanded where that is shorter.
 SHORT = 40
 
@@ -26,7 +29,18 @@ class Readable:
 
 
 def readable(expressions: Sequence[Expression]) -> Readable:
-    """Each expression expanded, as it stands, or with names for shared parts: whatever is short."""
+    """The expressions expanded, as they stand, or with names for shared parts: whatever is short."""
+    plain, named = _partly_named(expressions), _all_named(expressions)
+    return named if plain.size > SHORT and named.size < WORTH_NAMES * plain.size else plain
+
+
+def _all_named(expressions: Sequence[Expression]) -> Readable:
+    named, roots = with_names(expressions)
+    return Readable(named, tuple(roots), sum(map(leaves, [*roots, *(e for _, e in named)])))
+
+
+def _partly_named(expressions: Sequence[Expression]) -> Readable:
+    """Short expressions expanded or as they stand, with names for what the others share."""
     trees = fold(expressions, lambda e, sizes: sum(sizes) or 1)
     forms: dict[int, Formula | Expression] = {}
     for i, (e, form) in enumerate(zip(expressions, expanded(expressions, None), strict=True)):
@@ -45,7 +59,9 @@ def leaves(form: Formula | Expression) -> int:
     """The number of names and numbers in a formula as it is written."""
     if isinstance(form, Expression):
         return fold([form], lambda e, sizes: sum(sizes) or 1)[0]
-    return sum(1 + sum(leaves(base) for base, _ in monomial) for _, monomial in form.terms)
+    return (form.divisor != 1) + sum(
+        (abs(c) != 1) + sum(leaves(base) for base, _ in monomial) for c, monomial in form.terms
+    )
 
 
 def with_names(roots: Sequence[Expression]) -> tuple[tuple[tuple[str, Expression], ...], list[Expression]]:

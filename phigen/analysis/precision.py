@@ -52,6 +52,7 @@ class Study:
     """What was measured from 0 to ``time``; errors below ``floor`` are those of the ``reference``.
 
     ``set_up`` are the seconds that the solver takes once per trajectory; those of the points do not contain it.
+    ``language`` is that of all methods, ``rounds`` the number of repetitions.
     """
 
     time: float
@@ -59,6 +60,8 @@ class Study:
     floor: float
     reference: str
     set_up: float
+    language: str
+    rounds: int
     curves: tuple[Curve, ...]
 
     @property
@@ -101,7 +104,7 @@ def study(
         )
         curves.append(Curve(label, orders[label], points, slopes[label]))
     reference = "the closed form" if solution else "DOP853 at small steps"
-    return Study(h * span, span, floor, reference, seconds["", 0], tuple(curves))
+    return Study(h * span, span, floor, reference, seconds["", 0], race.language, rounds, tuple(curves))
 
 
 def error_of(state: Floats, target: Floats) -> float:

@@ -36,11 +36,14 @@ Runner = Callable[[float, int, int], Floats | None]
 
 @dataclass(frozen=True)
 class Race:
-    """The runners by their labels, and ``set_up``: what the solver does once per trajectory, so many times over."""
+    """The runners by their labels, and ``set_up``: what the solver does once per trajectory, so many times over.
+
+    ``language`` is what all of them are written in: ``C`` or ``Python``.
+    """
 
     runners: Mapping[str, Runner]
     set_up: Callable[[int], None]
-    description: str
+    language: str
 
 
 def compiled(compilation: Compilation, methods: Sequence[str], start: Floats, parameters: Mapping[str, float]) -> Race:
@@ -71,7 +74,7 @@ def compiled(compilation: Compilation, methods: Sequence[str], start: Floats, pa
     begin = getattr(library, f"{name}_race_start")
     begin.restype, begin.argtypes = ctypes.c_int, (pointer, pointer, size)
     runners = {method: runner(method) for method in (OWN, *explicit)}
-    return Race(runners, lambda repeats: begin(packed.ctypes.data, start.ctypes.data, repeats), "compiled C")
+    return Race(runners, lambda repeats: begin(packed.ctypes.data, start.ctypes.data, repeats), "C")
 
 
 def interpreted(solver: Solver, methods: Sequence[str], start: Floats, parameters: Mapping[str, float]) -> Race:

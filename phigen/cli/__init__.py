@@ -14,8 +14,8 @@ from typing import Any
 import click
 
 from phigen._version import __version__
+from phigen.cli import failures
 from phigen.cli.console import Console
-from phigen.cli.failures import report
 
 #: Commands in the order of the help page: name, module, one line.
 COMMANDS = {
@@ -26,6 +26,7 @@ COMMANDS = {
     "vendor": ("phigen.cli.vendor", "Copy solvers into another project, and check them there."),
     "tune": ("phigen.cli.tune", "Find the cheapest setting and step for an accuracy."),
     "verify": ("phigen.cli.verify", "Build every target and measure what the solvers promise."),
+    "report": ("phigen.cli.report", "Write one HTML page: formulas, proofs, measurements, figures."),
     "show": ("phigen.cli.show", "Show the formulas: π, Casimirs, α, β, S_1 … S_k."),
     "list": ("phigen.cli.list", "List the bundled specs."),
     "schema": ("phigen.cli.schema", "Print the JSON Schema of specs, for editors."),
@@ -73,7 +74,7 @@ class Commands(click.Group):
             done = super().main(args, prog_name, standalone_mode=False, **extra)
             code = done if isinstance(done, int) else 0
         except Exception as error:
-            code = report(error, console)
+            code = failures.report(error, console)
         if standalone_mode:
             sys.exit(code)
         return code
@@ -83,7 +84,7 @@ class Commands(click.Group):
             return super().invoke(ctx)
         except BrokenPipeError as error:
             # Not left to click, which would exit with 1, the code of a wrong spec.
-            return report(error, ctx.ensure_object(Console))
+            return failures.report(error, ctx.ensure_object(Console))
 
 
 @click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})

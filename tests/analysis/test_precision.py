@@ -98,7 +98,7 @@ def study(casimirs=1e-16):
         )
         for label, order in (("phigen", 4), ("rk4", 4), ("dop853", 8))
     ]
-    return Study(1.0, 10, 1e-15, "the closed form", 0.0, tuple(curves))
+    return Study(1.0, 10, 1e-15, "the closed form", 0.0, "C", 5, tuple(curves))
 
 
 def test_figures_name_methods_and_slopes():

@@ -186,6 +186,13 @@ def test_command_prints_a_table(file):
     assert "FAILED" not in result.output
 
 
+@pytest.mark.parametrize("steps", [1, 4])
+def test_a_run_of_few_steps_is_verified(file, steps):
+    file.write_text(TEXT.replace("steps: 2000", f"steps: {steps}"), encoding="utf-8")
+    result = CliRunner().invoke(group, ["verify", "--quick", str(file)])
+    assert result.exit_code == 0, result.output
+
+
 def test_command_for_machines_and_exit_code(file, monkeypatch):
     monkeypatch.setattr(verification, "ONE_STEP", 0.0)
     result = CliRunner().invoke(group, ["verify", "--quick", "--json", str(file)])

@@ -68,7 +68,7 @@ def draw_in_plane(axes: Any, names: Group, points: Floats) -> None:
     """A curve (rows, 2), and where it starts."""
     _label(axes, names)
     axes.grid(True)
-    _draw_curve(axes, points, SERIES[0], 1.0, 2.0, _width(points), _joins(points))
+    _draw_curve(axes, points, SERIES[0], 1.0, 2.0, _width(points), joins(points))
     axes.plot(*points[0], "o", color=PALETTE["ink"], markersize=4, zorder=3)
     axes.locator_params(axis="x", nbins=5)
 
@@ -95,7 +95,7 @@ def draw_in_space(axes: Any, names: Group, points: Floats, leaf: Leaf | None, zo
             _draw_faded(axes, box, towards, np.concatenate(lines), PALETTE["leaf"], 0.45, (0.2, 0.75), 1.0)
     # Of a curve that winds around many times, bands would show where its chords happen to end.
     alphas = (0.3, 1.0) if _length(points) < LONG else (0.8, 0.8)
-    _draw_faded(axes, box, towards, points, SERIES[0], _width(points), alphas, 1.5, _joins(points))
+    _draw_faded(axes, box, towards, points, SERIES[0], _width(points), alphas, 1.5, joins(points))
     axes.plot(*points[0], "o", color=PALETTE["ink"], markersize=4, zorder=20)
 
 
@@ -154,7 +154,7 @@ def _width(points: Floats) -> float:
     return float(np.clip(1.5 * math.sqrt(LONG / 2 / max(_length(points), 1e-9)), 0.3, 1.5))
 
 
-def _joins(points: Floats) -> bool:
+def joins(points: Floats) -> bool:
     """Whether chords between the rows look like the curve."""
     points = points[np.isfinite(points).all(axis=1)]
     size = np.ptp(points, axis=0) if len(points) else np.zeros(points.shape[1])

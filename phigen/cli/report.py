@@ -1,0 +1,85 @@
+"""``phigen report``: one HTML page about a spec, its solver, and what was proved and measured."""
+
+from __future__ import annotations
+
+import shlex
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from phigen.cli.console import Console, out, pass_console, verbosity
+from phigen.cli.experiment import prepared
+from phigen.cli.sources import ORDER, load_one, one_spec, scheme_option
+from phigen.errors import CheckError
+
+if TYPE_CHECKING:
+    from phigen.report.material import Material
+
+
+@click.command("report")
+@one_spec
+@click.option("-o", "--output", metavar="FILE", help="Where to write the page; - is stdout.  [default: NAME.html]")
+@click.option("--run", "name", metavar="NAME", help="Which run of the spec.  [default: the first]")
+@click.option("--order", type=ORDER, help="Order of the method, instead of the spec's.")
+@scheme_option
+@click.option("--lyapunov", is_flag=True, help="Lyapunov exponents of the run as well.")
+@click.option("--quick", is_flag=True, help="Fewer steps, fewer repetitions.")
+@verbosity
+@pass_console
+def command(
+    console: Console,
+    spec_file: str,
+    output: str | None,
+    name: str | None,
+    order: int | None,
+    scheme: str | None,
+    lyapunov: bool,
+    quick: bool,
+) -> None:
+    """Write one self-contained HTML page about a spec, to be read by anyone.
+
+    Formulas; what the compiler chose and why; what was proved, as `phigen check` does; what was measured, as
+    `phigen verify` does; figures of a run; errors against step and time, with classical methods beside them. The page
+    needs no network. Nothing is written if the mathematics of the spec is refuted. Exit code 5 if the solver falls
+    short of what it promises: the page says where.
+    """
+    from phigen.analysis.proof import examine, refutation
+    from phigen.cli.report_material import gathered
+    from phigen.cli.verify import with_tangent
+
+    spec = load_one(spec_file)
+    target = output if output and output != "-" else f"{spec.name}.html"
+    if Path(target).is_dir() or not Path(target).parent.is_dir():
+        raise click.BadParameter(f"{target!r} is not a file in a folder that exists", param_hint="--output")
+    experiment = prepared(spec, name) if spec.runs or name or lyapunov else None
+    if experiment is None:
+        console.warn(f"{spec.file}: the spec has no runs, so the page has no measurements and no figures")
+    found = examine(spec, order=order, scheme=scheme, extras=with_tangent(spec))
+    if found.refuted:
+        raise CheckError(refutation(found))
+    if found.compilation is None:
+        raise found.obstacle or AssertionError("an examination without compilation has an obstacle")
+    console.note(f"{spec.name}: {len(found.statements)} statements examined, none refuted")
+    given = {"run": name, "order": order, "scheme": scheme}
+    options = [part for key, value in given.items() if value for part in (f"--{key}", str(value))]
+    options += ["--lyapunov"] * lyapunov + ["--quick"] * quick
+    written = shlex.join(["phigen", "report", Path(spec_file).name, *options, "-o", Path(target).name])
+    material, failures = gathered(found, found.compilation, experiment, written, lyapunov, quick, console)
+    _write(material, output, target, console)
+    if failures:
+        raise failures[0]
+
+
+def _write(material: Material, output: str | None, target: str, console: Console) -> None:
+    from phigen.report.document import document
+    from phigen.report.drawable import NO_FIGURES, drawable
+
+    text = document(material)
+    if material.methods and not drawable():
+        console.warn(NO_FIGURES)
+    if output == "-":
+        out(text)
+        return
+    Path(target).write_text(text, encoding="utf-8")
+    console.note(f"wrote {target} ({len(text.encode()) // 1000} kB)")

@@ -1,0 +1,85 @@
+"""What ``phigen report`` puts on its page: one run integrated, verified, and its errors studied."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from phigen.cli.console import Console
+from phigen.cli.experiment import Experiment, loaded
+from phigen.cli.interruption import InterruptedRunError
+from phigen.cli.report_study import COMPARED, environment, studied
+from phigen.errors import PhigenError
+from phigen.report.material import Material
+
+if TYPE_CHECKING:
+    from phigen.analysis.proof import Examination
+    from phigen.analysis.verification import Verification
+    from phigen.compiler import Compilation
+
+
+def gathered(
+    found: Examination,
+    compilation: Compilation,
+    experiment: Experiment | None,
+    written: str,
+    lyapunov: bool,
+    quick: bool,
+    console: Console,
+) -> tuple[Material, list[PhigenError]]:
+    """What the page is made of, and what failed on the way."""
+    material = Material(found, compilation, written)
+    if experiment is None:
+        note = "The spec has no runs: nothing was measured. Add one under runs: with initial, step and steps."
+        return replace(material, notes=(note,)), []
+    material, failures = _integrated(material, experiment, lyapunov, console)
+    if failures:
+        return material, failures
+    verification = _verified(compilation, experiment, quick, console)
+    if verification.failures:
+        from phigen.cli.verify import fallen_short
+
+        failures.append(fallen_short(verification))
+    study, note = studied(compilation, experiment, quick, console)
+    notes = (*material.notes, note) if note else material.notes
+    where = environment() if study else {}
+    return replace(material, verification=verification, study=study, notes=notes, environment=where), failures
+
+
+def _integrated(
+    material: Material, experiment: Experiment, lyapunov: bool, console: Console
+) -> tuple[Material, list[PhigenError]]:
+    """With the trajectories of the solver and of the methods that the run compares with."""
+    from phigen.cli.recording import Files, Recorder, compared, record
+
+    compilation, run = material.compilation, experiment.run
+    solver = loaded(compilation, "auto", console)
+    console.note(f"{compilation.spec.name}: run {run.name}, {run.steps} steps")
+    recorder = Recorder(compilation, solver, experiment, Files(), lyapunov)
+    recorder.start()
+    failure, interrupted = record(recorder, console)
+    if interrupted:
+        raise InterruptedRunError("interrupted: no page was written")
+    methods, summaries = {recorder.label: recorder.trajectory(failure is not None)}, [recorder.watch.summary()]
+    for method in (run.compare or COMPARED) if failure is None else ():
+        watch, methods[method] = compared(compilation, solver, experiment, method, console)
+        summaries.append(watch.summary())
+    made = replace(
+        material,
+        run=run,
+        methods=methods,
+        summaries=tuple(summaries),
+        section=(recorder.section_text, recorder.points.rows[:, 1:], recorder.points.seen) if recorder.finder else None,
+        spectrum=recorder.growth.spectrum() if recorder.growth and recorder.session.steps else None,
+        notes=(f"The run could not be completed: {failure}.",) if failure else (),
+    )
+    return made, [failure] if failure else []
+
+
+def _verified(compilation: Compilation, experiment: Experiment, quick: bool, console: Console) -> Verification:
+    from phigen.cli.verify import verified
+    from phigen.runtime import toolchain
+
+    console.note(f"{compilation.spec.name}: verifying")
+    targets = compilation.spec.targets if toolchain.available() else ("numpy",)
+    return verified(compilation, experiment.run.name, quick, console, targets)

@@ -1,0 +1,109 @@
+"""What ``phigen report`` says of errors against step and time, and of the machine they were measured on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from phigen.cli.console import Console
+
+if TYPE_CHECKING:
+    from phigen.analysis.precision import Study
+    from phigen.cli.experiment import Experiment
+    from phigen.compiler import Compilation
+    from phigen.runtime.interface import Floats
+
+#: The methods to compare with, if the run names none.
+COMPARED = ("rk4",)
+#: Repetitions of a measurement of times, and with --quick.
+_ROUNDS, _FEW_ROUNDS = 5, 2
+#: Steps over which precision is studied with --quick.
+_FEW_STEPS = 256
+#: Where Linux names the processor.
+_PROCESSOR = Path("/proc/cpuinfo")
+
+
+def studied(
+    compilation: Compilation, experiment: Experiment, quick: bool, console: Console
+) -> tuple[Study | None, str]:
+    """The study of precision and time, or why there is none."""
+    import numpy as np
+
+    from phigen.analysis import precision, race
+    from phigen.api import solver_of
+    from phigen.runtime import toolchain
+
+    run, x0 = experiment.run, np.array(experiment.initial)
+    methods = list(dict.fromkeys([*(run.compare or COMPARED), "dop853"]))
+    console.note(f"{compilation.spec.name}: measuring errors and times")
+    if toolchain.available():
+        compared = race.compiled(compilation, methods, x0, experiment.parameters)
+    else:
+        compared = race.interpreted(solver_of(compilation, "numpy"), methods, x0, experiment.parameters)
+    steps = min(run.steps, _FEW_STEPS) if quick else run.steps
+    solution, casimirs = _closed_form(compilation, experiment, x0), _casimirs(compilation, experiment, x0)
+    rounds = _FEW_ROUNDS if quick else _ROUNDS
+    try:
+        found = precision.study(
+            compared, compilation.order.order, experiment.h, steps, solution, casimirs, rounds=rounds
+        )
+    except ArithmeticError as error:
+        return None, f"Errors against step and time could not be measured: {error}."
+    return found, ""
+
+
+def _closed_form(compilation: Compilation, experiment: Experiment, x0: Floats) -> Callable[[float], Floats] | None:
+    """The closed form of the run, if it gives every coordinate."""
+    import numpy as np
+
+    from phigen.analysis.summary import exact_solution
+
+    system, run = compilation.system, experiment.run
+    if set(run.exact) != set(system.coordinates):
+        return None
+
+    def solution(t: float) -> Floats:
+        found = exact_solution(system, run, experiment.parameters, x0, np.array([t]))
+        return np.array([float(found[c][0]) for c in system.coordinates])
+
+    return solution
+
+
+def _casimirs(compilation: Compilation, experiment: Experiment, x0: Floats) -> Callable[[Floats], float] | None:
+    """The largest error of a Casimir at a state, relative to its size at the start."""
+    from phigen.analysis.arrays import evaluate
+    from phigen.analysis.measures import size_of
+    from phigen.analysis.precision import ROUNDING
+
+    system = compilation.system
+    formulas = list(system.casimirs.values())
+    if not formulas:
+        return None
+
+    def at(x: Floats) -> Mapping[str, float]:
+        return {**experiment.parameters, **dict(zip(system.coordinates, x.tolist(), strict=True))}
+
+    start = evaluate(formulas, at(x0))
+    sizes = [size_of(c, system.coordinates, at(x0)) for c in formulas]
+
+    def worst(x: Floats) -> float:
+        values = evaluate(formulas, at(x))
+        return max(ROUNDING, *(abs(float(v - s)) / size for v, s, size in zip(values, start, sizes, strict=True)))
+
+    return worst
+
+
+def environment() -> dict[str, str]:
+    """What measured times depend on."""
+    import platform
+
+    from phigen.runtime import toolchain
+
+    try:
+        lines = _PROCESSOR.read_text(encoding="utf-8", errors="replace").splitlines()
+    except OSError:
+        lines = []
+    processor = next((line.partition(":")[2].strip() for line in lines if line.startswith("model name")), "")
+    compiler = toolchain.find().version if toolchain.available() else f"none; Python {platform.python_version()}"
+    return {"times were measured on": processor or platform.machine(), "with the C compiler": compiler}

@@ -1,0 +1,102 @@
+"""The page of a spec, put together from its sections."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+from markupsafe import Markup
+
+from phigen.analysis.mathml import math, name
+from phigen.report import evidence, page
+from phigen.report.drawable import NO_FIGURES, drawable
+from phigen.report.material import Material
+from phigen.report.method import method_section
+from phigen.report.precision import precision_section
+from phigen.report.system import system_section
+from phigen.report.viewer import viewer
+
+#: Characters of the spec that are shown.
+SOURCE = 100_000
+
+
+def document(material: Material) -> str:
+    """The HTML of the page. Everything but measured times depends on its arguments alone."""
+    spec = material.compilation.spec
+    title = spec.title or spec.name
+    lead = page.block(
+        "lead",
+        kind=f"Poisson system {spec.name}, solver of order {material.compilation.order.order} by phigen",
+        title=title,
+        paragraphs=[p for p in spec.description.split("\n") if p.strip()],
+        references=spec.references,
+    )
+    return page.page(f"{title} – phigen", lead, list(_sections(material)))
+
+
+def _sections(material: Material) -> Iterator[tuple[str, str, Markup]]:
+    yield "brief", "In brief", evidence.brief_section(material)
+    yield "system", "The system", system_section(material.compilation.system)
+    yield "choices", "What the compiler chose", evidence.choices_section(material.compilation)
+    yield "method", "The method", method_section(material.compilation)
+    yield "proofs", "What was proved", evidence.proofs_section(material)
+    if material.verification:
+        yield "measured", "What was measured", evidence.measured_section(material.verification)
+    if material.methods:
+        yield "run", "A run", page.joined(_run(material))
+    if material.study:
+        yield "precision", "Precision and time", precision_section(material.study)
+    yield "provenance", "Where this page comes from", page.joined(_provenance(material))
+
+
+def _run(material: Material) -> Iterator[Markup]:
+    run, first = material.run, next(iter(material.methods.values()))
+    if run is None:
+        return
+    last = int(np.flatnonzero(np.isfinite(first.x).all(axis=1))[-1])
+    start, end = (_values(dict(zip(first.coordinates, first.x[row].tolist(), strict=True))) for row in (0, last))
+    stored = "all stored" if run.stride == 1 else f"one in {run.stride} stored"
+    pairs = [("run", run.name), ("start", start)]
+    if run.description:
+        pairs.insert(1, ("description", run.description))
+    if first.parameters:
+        pairs.append(("parameters", _values(first.parameters)))
+    pairs += [("steps", f"{first.steps} of {first.h:.9g}, {stored}"), (f"t = {first.t[last]:.9g}", end)]
+    yield page.facts(pairs)
+    yield evidence.summary_table(material.summaries)
+    if material.spectrum:
+        yield evidence.lyapunov_paragraph(material.spectrum)
+    if not drawable():
+        yield page.paragraph(NO_FIGURES, "note")
+        yield viewer(material.methods)
+        return
+    from phigen.report import pictures
+
+    yield pictures.error_picture(material)
+    yield page.heading("In phase space")
+    yield viewer(material.methods)
+    yield pictures.trajectory_picture(material.compilation, first)
+    if material.section is not None:
+        yield pictures.section_picture(first.coordinates, *material.section)
+    if material.spectrum:
+        yield pictures.lyapunov_picture(material.spectrum)
+
+
+def _values(values: Mapping[str, float]) -> Markup:
+    """``x_1 = 0.5, x_2 = 1``."""
+    written = (Markup("{} = {}").format(Markup(math(name(n))), f"{v:.9g}".replace("-", "−")) for n, v in values.items())
+    return Markup(", ").join(written)
+
+
+def _provenance(material: Material) -> Iterator[Markup]:
+    spec = material.compilation.spec
+    pairs = [
+        ("phigen", material.compilation.program.version),
+        ("spec", spec.name),
+        ("sha256 of the spec", spec.source_sha256),
+        ("command", material.command),
+        *material.environment.items(),
+    ]
+    yield page.facts(pairs)
+    cut = "" if len(spec.source) <= SOURCE else f", the first {SOURCE} of {len(spec.source)} characters"
+    yield page.fold(f"The spec{cut}", page.block("source", name="The spec", text=spec.source[:SOURCE]))

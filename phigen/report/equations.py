@@ -1,0 +1,49 @@
+"""Equations of a page: shown, folded or left out according to their size."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from markupsafe import Markup
+
+from phigen.analysis import mathml, parts
+from phigen.analysis.formulas import SHOWN, Formula
+from phigen.report import page
+from phigen.scheme.lowering import operation_counts
+from phigen.symbolic.expression import Expression
+
+#: Names and numbers of a group of formulas: beyond the first number it is folded, beyond the second left out.
+FOLDED, LEFT_OUT = 160, 4_000
+#: Terms of a polynomial that can be unfolded.
+MOST_TERMS = 150
+
+
+def equation(left: str, form: Formula | Expression, sign: str = "=") -> list[str]:
+    """The pieces of one equation."""
+    first, *rest = mathml.pieces(form)
+    return [mathml.math(f"{left}<mo>{sign}</mo>{first}"), *map(mathml.math, rest)]
+
+
+def group(left: Sequence[str], expressions: Sequence[Expression], what: str, sign: str = "=") -> Markup:
+    """Equations for ``what``, with names for the parts that they share."""
+    found = parts.readable(expressions)
+    if found.size > LEFT_OUT:
+        counts = ", ".join(f"{n} {kind}" for kind, n in operation_counts(list(expressions)).items() if n)
+        return page.paragraph(f"{what}: {len(left)} formulas of {counts}; phigen show prints them.", "note")
+    listed = page.equations([equation(name, form, sign) for name, form in zip(left, found.forms, strict=True)])
+    if found.parts:
+        where = page.equations([equation(mathml.name(name), e) for name, e in found.parts])
+        listed = page.joined([listed, page.paragraph("where"), where])
+    return listed if found.size <= FOLDED else page.fold(what, listed)
+
+
+def polynomial(left: str, formula: Formula) -> Markup:
+    """One equation, all of whose terms can be unfolded if there are many."""
+    if formula.size <= SHOWN + 1:
+        return page.equations([equation(left, formula)])
+    cut = replace(formula, terms=formula.terms[:SHOWN], hidden=formula.size - SHOWN)
+    short = page.equations([equation(left, cut)])
+    if formula.size > MOST_TERMS:
+        return page.joined([short, page.paragraph(f"{formula.size} terms; phigen show --full prints them.", "note")])
+    return page.joined([short, page.fold(f"All {formula.size} terms", page.equations([equation(left, formula)]))])

@@ -1,0 +1,166 @@
+"""The sections about what was chosen, proved and measured: tables."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+
+from markupsafe import Markup
+
+from phigen.analysis.lyapunov import Spectrum
+from phigen.analysis.summary import Drift, Summary
+from phigen.analysis.verification import Check, Verification
+from phigen.compiler import Compilation
+from phigen.realisations.protocol import BiRealisation
+from phigen.report import page
+from phigen.report.material import Material
+from phigen.symbolic.verdict import PROVED, REFUTED, UNDECIDED, Statement
+
+#: One tile of the summary: class, value, label, note.
+Tile = tuple[str, str, str, str]
+
+_GOOD, _BAD, _UNSURE = "good", "bad", "unsure"
+_MARKS = {_GOOD: "✓ ", _BAD: "✗ ", _UNSURE: "~ "}
+
+
+def brief_section(material: Material) -> Markup:
+    """The whole page in a few numbers."""
+    tiles = [_proofs_tile(material.examination.statements)]
+    if material.verification:
+        tiles += _measured_tiles(material.verification)
+    blocks = [page.block("tiles", tiles=tiles)]
+    blocks += [page.paragraph(note, "note") for note in material.notes]
+    return page.joined(blocks)
+
+
+def choices_section(compilation: Compilation) -> Markup:
+    """What the compiler chose, and why."""
+    program = compilation.program
+    pairs = [
+        ("Poisson tensor", str(compilation.system.shape)),
+        *(
+            [("bi-realisation", f"{compilation.label}, {_reason(compilation.chart)}")]
+            if compilation.realisation
+            else []
+        ),
+        ("order", str(compilation.order.order) + (f", {compilation.order.note}" if compilation.order.note else "")),
+    ]
+    for fact in program.facts:
+        name, colon, text = fact.partition(": ")
+        if colon and name != "bi-realisation":
+            pairs.append((name, text))
+        elif not colon:
+            pairs.append(("note", fact))
+    counts = ", ".join(f"{n} {what}" for what, n in program.operations.items() if n)
+    pairs.append((f"one {program.driver_unit}", counts or "nothing to compute"))
+    return page.facts((name, page.typeset(text)) for name, text in pairs)
+
+
+def _reason(realisation: BiRealisation) -> str:
+    said, automatic = realisation.explanation, f"auto picked {realisation.kind}, "
+    return "chosen by phigen, " + said.removeprefix(automatic) if said.startswith(automatic) else said
+
+
+def proofs_section(material: Material) -> Markup:
+    """All statements of `phigen check`."""
+    blocks = []
+    for group, statements in material.examination.groups.items():
+        rows = [_statement(s) for s in statements]
+        blocks.append(page.table(group, [("", "statement"), ("verdict", "verdict"), ("", "how")], rows))
+    said = "Proved means in exact arithmetic, for all values of the coordinates, covectors and parameters."
+    return page.joined([page.paragraph(said), *blocks])
+
+
+def measured_section(v: Verification) -> Markup:
+    """All checks of `phigen verify`."""
+    columns = [("", "property"), ("number", "phigen"), ("", "required"), ("verdict", "verdict")]
+    columns += [("number", method) for method in v.compared]
+    rows = [_check(check, v.compared) for check in v.checks]
+    targets = " and ".join({"c": "C", "numpy": "NumPy"}.get(t, t) for t in v.targets)
+    said = f"Run {v.run}: {v.steps} steps of {v.step:.9g}, generated for {targets}. Solver: {v.label}."
+    meaning = (
+        "Errors are relative to the size of a quantity. Last/first window is the largest error of the last tenth of "
+        "the run over that of the first: 1 is no drift. The Poisson defect is the largest entry of DΦ π DΦᵀ − π∘Φ; "
+        "DΦ is the derivative of a step Φ. An order of ∞ means that all errors are those of rounding."
+    )
+    return page.joined(
+        [page.paragraph(said), page.table("What the solver shows, and classical methods beside it", columns, rows),
+         page.paragraph(meaning, "note")]
+    )  # fmt: skip
+
+
+def summary_table(summaries: Sequence[Summary]) -> Markup:
+    """The largest errors of a run, one column for each method."""
+    first = summaries[0]
+    rows = [("energy H", [_drift(s.energy) for s in summaries])]
+    for kind, noun in (("casimirs", "Casimir"), ("invariants", "invariant")):
+        rows += [(f"{noun} {n}", [_drift(getattr(s, kind)[n]) for s in summaries]) for n in getattr(first, kind)]
+    if first.exact:
+        rows.append(("solution, against the closed form", [_drift(s.exact) for s in summaries if s.exact]))
+    if any(s.good < s.rows for s in summaries):
+        rows.append(("rows before it broke down", [("number", f"{s.good} of {s.rows}") for s in summaries]))
+    columns = [("", "quantity"), *(("number", s.method) for s in summaries)]
+    return page.table("Largest errors along the run, relative to the value at the start", columns, rows)
+
+
+def lyapunov_paragraph(spectrum: Spectrum) -> Markup:
+    """The exponents, and how well they are known."""
+    found = ", ".join(page.scientific(v) for v in spectrum.exponents.tolist())
+    said = f"Lyapunov exponents after t = {spectrum.t:.9g}: {found}; their sum is {page.scientific(spectrum.total)}."
+    known = f"The second half of the time changed them by {page.scientific(spectrum.uncertainty)}, at most."
+    return page.paragraph(f"{said} {known}")
+
+
+def _statement(s: Statement) -> tuple[str, list[page.Cell]]:
+    kind = _GOOD if s.verdict == PROVED else _BAD if s.verdict == REFUTED else _UNSURE
+    how = s.detail + (f"; residual {s.residual}" if s.residual else "")
+    return page.typeset(s.name), [(f"verdict {kind}", _MARKS[kind] + s.verdict), ("", page.typeset(how))]
+
+
+def _check(check: Check, compared: Sequence[str]) -> tuple[str, list[page.Cell]]:
+    kind = "" if not check.limit else _GOOD if check.passed else _BAD
+    verdict = "" if not kind else _MARKS[kind] + ("holds" if check.passed else f"failed: {check.reason}")
+    cells = [("number", page.scientific(check.value)), ("", page.typeset(check.limit)), (f"verdict {kind}", verdict)]
+    others = [("number", page.scientific(check.others[m]) if m in check.others else "") for m in compared]
+    return check.name, [*cells, *others]
+
+
+def _drift(drift: Drift) -> page.Cell:
+    return "number", page.scientific(drift.error) + ("" if drift.relative else " (absolute)")
+
+
+def _proofs_tile(statements: Sequence[Statement]) -> Tile:
+    counts = Counter(s.verdict for s in statements)
+    refuted = counts.pop(REFUTED, 0)
+    kind = _BAD if refuted else _UNSURE if counts[UNDECIDED] else _GOOD
+    others = "; ".join(f"{s.verdict}: {s.name}" for s in statements if s.verdict != PROVED)
+    said = f"{counts[PROVED]} of {len(statements)}"
+    return kind, said, "statements proved", f"{refuted} refuted" if refuted else others or "in exact arithmetic"
+
+
+def _measured_tiles(v: Verification) -> Iterator[Tile]:
+    judged = [c for c in v.checks if c.limit]
+    passed = sum(c.passed for c in judged)
+    kind = _GOOD if passed == len(judged) else _BAD
+    yield kind, f"{passed} of {len(judged)}", "measured properties hold", f"{v.steps} steps of {v.step:.9g}"
+    casimirs = [c for c in v.checks if c.name.startswith("Casimir") and "largest" in c.name]
+    if casimirs:
+        worst = max(casimirs, key=lambda c: c.value)
+        label = f"largest error of {'a' if len(casimirs) > 1 else 'the'} Casimir"
+        yield _tile(worst, label, {m: max(c.others.get(m, math.nan) for c in casimirs) for m in v.compared})
+    for name, label in (
+        ("energy: largest error", "largest error of the energy"),
+        ("observed order", "observed order"),
+        ("Poisson defect", "Poisson defect of a step"),
+        ("reversibility", "error of a step there and back"),
+    ):
+        for check in v.checks:
+            if check.name.startswith(name) and not math.isnan(check.value):
+                yield _tile(check, label, check.others)
+
+
+def _tile(check: Check, label: str, others: Mapping[str, float]) -> Tile:
+    known = {m: v for m, v in others.items() if not math.isnan(v)}
+    value = "exact" if check.value == math.inf else page.scientific(check.value)
+    return _GOOD if check.passed else _BAD, value, label, page.listed(known)

@@ -1,0 +1,39 @@
+"""Everything that a page is made of; gathering it takes the time, see `phigen.cli.report`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from phigen.analysis.arrays import Floats
+from phigen.analysis.lyapunov import Spectrum
+from phigen.analysis.precision import Study
+from phigen.analysis.proof import Examination
+from phigen.analysis.summary import Summary
+from phigen.analysis.verification import Verification
+from phigen.compiler import Compilation
+from phigen.runtime.trajectory import Trajectory
+from phigen.spec.model import Run
+
+
+@dataclass(frozen=True)
+class Material:
+    """What was proved, and what was measured on one run; what could not be had is None, and ``notes`` say why.
+
+    ``methods`` are trajectories by their labels, the solver's first. ``section`` is what its Poincaré section is the
+    zero of, some of its points (rows, DIM), and how many there are; ``spectrum`` are its Lyapunov exponents.
+    ``environment`` says what the times depend on. ``command`` makes the page again.
+    """
+
+    examination: Examination
+    compilation: Compilation
+    command: str
+    run: Run | None = None
+    methods: Mapping[str, Trajectory] = field(default_factory=dict)
+    summaries: tuple[Summary, ...] = ()
+    section: tuple[str, Floats, int] | None = None
+    spectrum: Spectrum | None = None
+    verification: Verification | None = None
+    study: Study | None = None
+    environment: Mapping[str, str] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()

@@ -1,0 +1,108 @@
+"""The section about the method: α, β and S_1 … S_k of a series, or the flows of a splitting."""
+
+from __future__ import annotations
+
+from markupsafe import Markup
+
+from phigen.analysis import flows, generating, mathml
+from phigen.compiler import Compilation
+from phigen.report import page
+from phigen.report.equations import equation, group, polynomial
+from phigen.report.known import ALPHA_BETA_OF_A_PATH, BETA_OF_ALPHA, GAUGED, MODIFIED, PATH_STEP, PHI, STEP
+from phigen.splitting.flow import Flow
+
+#: A step of more flows is folded.
+FLOWS = 12
+
+
+def method_section(compilation: Compilation) -> Markup:
+    """How a step is made, as formulas."""
+    split = compilation.splitting is not None
+    said = flows.method(compilation) if split else generating.method(compilation)
+    lead = page.paragraph(page.typeset(f"{said[0].upper()}{said[1:]}."))
+    return page.joined([lead, *_gauge(compilation), *(_splitting(compilation) if split else _series(compilation))])
+
+
+def _gauge(compilation: Compilation) -> list[Markup]:
+    gauge = compilation.gauge
+    taken = [
+        f"{mathml.name(s)}<mo>&#x2062;</mo>{mathml.name(c)}" for s, c in zip(gauge.symbols, gauge.free, strict=True)
+    ]
+    taken += [f"{mathml.grouped(value)}<mo>&#x2062;</mo>{mathml.name(c)}" for c, value in gauge.fixed.items()]
+    if not taken:
+        return []
+    said = "In what follows, H stands for this: a multiple of a Casimir changes no flow, but the error of a step."
+    gauged = mathml.math(GAUGED + "".join(f"<mo>−</mo>{part}" for part in taken))
+    return [page.heading("Gauge"), page.equations([[gauged]]), page.paragraph(said, "note")]
+
+
+def _series(compilation: Compilation) -> list[Markup]:
+    realisation, names = compilation.chart, compilation.system.coordinates
+    blocks = [page.heading("One step"), page.equations(PATH_STEP if realisation.path else STEP)]
+    blocks.append(page.heading(f"Bi-realisation: {realisation.label}"))
+    if realisation.path:
+        blocks.append(page.equations(ALPHA_BETA_OF_A_PATH))
+    elif realisation.symmetric:
+        left = [mathml.indexed("α", c) for c in names]
+        blocks += [group(left, realisation.alpha, "The components of α"), page.equations([BETA_OF_ALPHA])]
+    else:
+        left = [mathml.indexed(letter, c) for letter in "αβ" for c in names]
+        blocks.append(group(left, [*realisation.alpha, *realisation.beta], "The components of α and β"))
+    if not realisation.path and any("φ" in mathml.expression(e) for e in realisation.alpha):
+        blocks.append(page.equations([PHI]))
+    blocks.append(page.paragraph(f"Source: {realisation.reference}.", "note"))
+    return [*blocks, *_generating_function(compilation)]
+
+
+def _generating_function(compilation: Compilation) -> list[Markup]:
+    listed, correction = generating.series_formulas(compilation, None)
+    terms = "<mo>+</mo>".join(f"{_power('h', i)}<mo>&#x2062;</mo>{_indexed('S', i)}" for i, _ in listed)
+    blocks = [page.heading("Generating function")]
+    blocks.append(page.equations([[mathml.math(f"{_indexed('S', 'h')}<mo>=</mo>{terms}")]]))
+    blocks += [polynomial(_indexed("S", i), formula) for i, formula in listed]
+    if correction is None or not correction.size:
+        return blocks
+    blocks.append(page.heading("Modified Hamiltonian"))
+    blocks.append(page.paragraph("A step is the exact flow, over the time h, of a Hamiltonian near H:"))
+    leading = f"{_power('h', compilation.order.order)}<mo>&#x2062;</mo><mi>M</mi><mo>+</mo><mo>…</mo>"
+    return [*blocks, page.equations([[mathml.math(MODIFIED + leading)]]), polynomial("<mi>M</mi>", correction)]
+
+
+def _splitting(compilation: Compilation) -> list[Markup]:
+    parts = flows.flows_of(compilation)
+    sum_of_parts = "<mo>+</mo>".join(_indexed("H", k) for k in range(1, len(parts) + 1))
+    blocks = [page.heading("Parts of H and their flows over a time h")]
+    blocks.append(page.equations([[mathml.math(f"<mi>H</mi><mo>=</mo>{sum_of_parts}")]]))
+    for k, flow in enumerate(parts, 1):
+        blocks += _flow(compilation, k, flow)
+    return [*blocks, _schedule(compilation)]
+
+
+def _flow(compilation: Compilation, k: int, flow: Flow) -> list[Markup]:
+    moved = flows.images(flow, compilation.system.coordinates)
+    left = [mathml.name(c) for c in moved]
+    part = page.equations([equation(_indexed("H", k), flow.hamiltonian)])
+    images = group(left, list(moved.values()), f"The flow of H_{k}", "↦")
+    return [part, images, page.paragraph(f"This flow: {flow.manner}.", "note")] if moved else [part]
+
+
+def _schedule(compilation: Compilation) -> Markup:
+    """The flows of one step, in their order."""
+    schedule = compilation.program.schedule
+    made = schedule.flows if schedule else ()
+    rows = [
+        (str(i), [("", page.typeset(f"H_{part + 1}")), ("number", f"{schedule.times[row]:.16g}".replace("-", "−"))])
+        for i, (part, row) in enumerate(made, 1)
+        if schedule
+    ]
+    table = page.table("One step", [("", ""), ("", "flow of"), ("number", "over this part of h")], rows)
+    return table if len(rows) <= FLOWS else page.fold(f"The {len(rows)} flows of one step", table)
+
+
+def _indexed(letter: str, index: int | str) -> str:
+    tag = "mn" if isinstance(index, int) else "mi"
+    return f"<msub><mi>{letter}</mi><{tag}>{index}</{tag}></msub>"
+
+
+def _power(letter: str, exponent: int) -> str:
+    return f"<mi>{letter}</mi>" if exponent == 1 else f"<msup><mi>{letter}</mi><mn>{exponent}</mn></msup>"

@@ -1,0 +1,153 @@
+"""HTML: blocks made from templates that escape what they are given, and the page around them.
+
+Text of specs is untrusted. Templates escape; only what this package has built itself is `Markup`. The page declares a
+Content-Security-Policy which allows no more than its own style sheet and scripts, by their hashes, and no network.
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import json
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from functools import cache
+from typing import Any
+
+import jinja2
+from jinja2.utils import htmlsafe_json_dumps
+from markupsafe import Markup, escape
+
+from phigen import resources
+from phigen._version import __version__
+
+#: A cell of a table: its class, and its text or markup.
+Cell = tuple[str, str]
+
+#: More equations than this stand in columns if none has more characters of markup than that.
+MANY, SHORT = 6, 420
+
+_STYLES, _SCRIPTS = ("report.css",), ("theme.js", "viewer.js")
+
+
+@cache
+def _environment() -> jinja2.Environment:
+    return jinja2.Environment(
+        loader=jinja2.FileSystemLoader(resources.templates() / "report", encoding="utf-8"),
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        autoescape=True,
+    )
+
+
+def block(template: str, **values: object) -> Markup:
+    """``templates/report/TEMPLATE.html.jinja`` with the values put in, escaped unless they are `Markup`."""
+    return Markup(_environment().get_template(f"{template}.html.jinja").render(values))
+
+
+def joined(blocks: Iterable[Markup]) -> Markup:
+    """Blocks one after the other."""
+    return Markup("\n").join(blocks)
+
+
+def paragraph(text: str, kind: str = "") -> Markup:
+    """A paragraph; ``kind`` is its class."""
+    return block("paragraph", text=text, kind=kind)
+
+
+def heading(text: str) -> Markup:
+    """A heading within a section."""
+    return block("heading", text=text)
+
+
+def table(caption: str, columns: Sequence[Cell], rows: Sequence[tuple[str, Sequence[Cell]]]) -> Markup:
+    """A table whose rows have headers; ``columns`` names the first column too."""
+    return block("table", caption=caption, columns=columns, rows=rows)
+
+
+def facts(pairs: Iterable[tuple[str, str]]) -> Markup:
+    """Terms and what is to be said of them."""
+    return block("facts", pairs=list(pairs))
+
+
+def fold(summary: str, body: Markup) -> Markup:
+    """What is shown on demand."""
+    return block("fold", summary=summary, body=body)
+
+
+def equations(listed: Sequence[Sequence[str]]) -> Markup:
+    """Equations, each in pieces of MathML between which lines may break; in columns if there are many and all short."""
+    short = len(listed) > MANY and all(sum(map(len, pieces)) < SHORT for pieces in listed)
+    return block(
+        "equations",
+        kind="columns" if short else "",
+        equations=[[Markup(piece) for piece in pieces] for pieces in listed],
+    )
+
+
+def data(identifier: str, value: Any) -> Markup:
+    """Data for a script; no text in it can end the element."""
+    return block("data", identifier=identifier, value=htmlsafe_json_dumps(value, dumps=_compact))
+
+
+def _compact(value: Any, **_: Any) -> str:
+    return json.dumps(value, separators=(",", ":"), ensure_ascii=True)
+
+
+def page(title: str, lead: Markup, sections: Sequence[tuple[str, str, Markup]]) -> str:
+    """The whole page from sections (id, title, body)."""
+    css, scripts = "\n".join(map(_asset, _STYLES)), "\n".join(map(_asset, _SCRIPTS))
+    return _environment().get_template("page.html.jinja").render(
+        title=title,
+        lead=lead,
+        sections=sections,
+        contents=[(identifier, name) for identifier, name, _ in sections],
+        policy=f"default-src 'none'; img-src data:; style-src {_hash(css)}; script-src {_hash(scripts)}; "
+        "base-uri 'none'; form-action 'none'",
+        css=Markup(css),
+        scripts=Markup(scripts),
+        version=__version__,
+    )  # fmt: skip
+
+
+def _asset(name: str) -> str:
+    return (resources.templates() / "report" / name).read_text(encoding="utf-8")
+
+
+def _hash(text: str) -> str:
+    """What a Content-Security-Policy calls an inline element."""
+    return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
+
+
+_SUBSCRIPT = re.compile(r"(?<=[A-Za-zα-ωΑ-Ω∂])_(\w+)")
+_POWER = re.compile(r"(?:\*\*|\^)(-?\d+|\w)")
+_DECIMAL = re.compile(r"(?<=\d)e([+-]\d+)")
+_SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+def typeset(text: str) -> Markup:
+    """Plain text with formulas in it: S_1, h^2 and 3e-16 as mathematics writes them."""
+    found = str(escape(text))
+    found = _SUBSCRIPT.sub(r"<sub>\1</sub>", found)
+    found = _POWER.sub(r"<sup>\1</sup>", found)
+    return Markup(_DECIMAL.sub(lambda m: f"·10<sup>{int(m[1])}</sup>".replace("-", "−"), found))
+
+
+def scientific(value: float, digits: int = 2) -> str:
+    """A number to read: 3.1·10⁻⁸, 0.25, 7.99, 0, ∞, and a dash for what is not a number."""
+    if value != value:
+        return "–"
+    if value in (float("inf"), float("-inf")):
+        return "∞" if value > 0 else "−∞"
+    if value == 0:
+        return "0"
+    if 1e-2 <= abs(value) < 1e3:
+        return f"{value:.{digits}f}".replace("-", "−")
+    mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
+    return f"{mantissa}·10{str(int(exponent)).translate(_SUPERSCRIPTS)}".replace("-", "−", 1)
+
+
+def listed(values: Mapping[str, float]) -> str:
+    """``rk4 3.1·10⁻⁸, dop853 …``."""
+    return ", ".join(f"{name} {scientific(value)}" for name, value in values.items())

@@ -1,0 +1,118 @@
+"""The figures of a page, each with a title, a description for those who cannot see it, and a caption."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from markupsafe import Markup
+
+from phigen.analysis import figures
+from phigen.analysis.arrays import Floats
+from phigen.analysis.lyapunov import Spectrum
+from phigen.analysis.precision import Study
+from phigen.analysis.summary import Summary
+from phigen.compiler import Compilation
+from phigen.report import page
+from phigen.report.material import Material
+from phigen.report.svg import inlined
+from phigen.runtime.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+#: Rows of a trajectory, and Casimirs, that are drawn at most.
+ROWS, CASIMIRS = 3_000, 11
+
+
+def trajectory_picture(compilation: Compilation, trajectory: Trajectory) -> Markup:
+    """The trajectory in phase space."""
+    names = ", ".join(trajectory.coordinates)
+    figure = figures.trajectory_figure(_thinned(trajectory), compilation.system.casimirs)
+    caption = f"The trajectory of {names}, from the dot at t = 0 to t = {trajectory.t[-1]:.9g}."
+    return _picture("trajectory", figure, "Trajectory in phase space", caption, caption)
+
+
+def error_picture(material: Material) -> Markup:
+    """Errors of energy and Casimirs over the time."""
+    caption = (
+        "Errors of what the flow conserves, over the time, on a logarithmic scale. The dotted line is one unit in the "
+        "last place of a double."
+    )
+    methods = {label: _with_few_casimirs(t) for label, t in material.methods.items()}
+    left_out = len(next(iter(material.methods.values())).casimirs) - CASIMIRS
+    if left_out > 0:
+        caption += f" {left_out} more Casimirs are in the table above only."
+    worst = "; ".join(_described(s) for s in material.summaries)
+    figure = figures.error_figure(methods)
+    return _picture("errors", figure, "Errors of energy and Casimirs over time", f"Largest errors: {worst}.", caption)
+
+
+def section_picture(names: Sequence[str], function: str, points: Floats, count: int) -> Markup:
+    """The Poincaré section: some of its points."""
+    shown = points[:: max(1, -(-len(points) // ROWS))]
+    caption = f"Poincaré section: {count} points where {function} rises through zero"
+    caption += f"; {len(shown)} of them are drawn." if len(shown) < count else "."
+    figure = figures.section_figure({f"{function} = 0": shown}, names)
+    return _picture("section", figure, "Poincaré section", caption, caption)
+
+
+def lyapunov_picture(spectrum: Spectrum) -> Markup:
+    """How the Lyapunov exponents converged."""
+    caption = f"How the Lyapunov exponents converge, up to t = {spectrum.t:.9g}."
+    found = ", ".join(page.scientific(v) for v in spectrum.exponents.tolist())
+    return _picture(
+        "lyapunov", figures.lyapunov_figure(spectrum), "Lyapunov exponents", f"At the end: {found}.", caption
+    )
+
+
+def convergence_picture(study: Study) -> Markup:
+    """Error against step size."""
+    slopes = page.listed({f"{c.label} (order {c.order})": c.slope for c in study.curves})
+    caption = f"Error at t = {study.time:.4g} against the step. The thin line has the slope of the stated order."
+    return _picture(
+        "convergence", figures.convergence_figure(study), "Convergence", f"Observed orders: {slopes}.", caption
+    )
+
+
+def work_picture(study: Study) -> Markup:
+    """Error against time."""
+    figure = figures.work_precision_figure(study)
+    words = "; ".join(_fastest(study, tolerance) for tolerance in (1e-3, 1e-6, 1e-9))
+    caption = f"Error at t = {study.time:.4g} against the time of the run (measured)."
+    return _picture("work", figure, "Work and precision", f"Seconds needed: {words}.", caption)
+
+
+def _picture(identifier: str, figure: Figure, title: str, description: str, caption: str) -> Markup:
+    image = inlined(figures.svg(figure), identifier, title, description)
+    return page.block("figure", identifier=f"figure-{identifier}", image=image, caption=caption)
+
+
+def _described(s: Summary) -> str:
+    errors = {"energy": s.energy.error, **{f"Casimir {n}": d.error for n, d in s.casimirs.items()}}
+    return f"{s.method}: {page.listed(errors)}"
+
+
+def _fastest(study: Study, tolerance: float) -> str:
+    found = {}
+    for curve in study.curves:
+        times = [p.seconds for p in curve.points if p.error <= tolerance]
+        found[curve.label] = min(times) if times else float("nan")
+    return f"for an error of {page.scientific(tolerance, 1)}, {page.listed(found)}"
+
+
+def _with_few_casimirs(trajectory: Trajectory) -> Trajectory:
+    return replace(trajectory, casimirs=dict(list(trajectory.casimirs.items())[:CASIMIRS]))
+
+
+def _thinned(trajectory: Trajectory) -> Trajectory:
+    stride = max(1, -(-len(trajectory) // ROWS))
+    casimirs = {name: values[::stride] for name, values in trajectory.casimirs.items()}
+    return replace(
+        trajectory,
+        t=trajectory.t[::stride],
+        x=trajectory.x[::stride],
+        energy=trajectory.energy[::stride],
+        casimirs=casimirs,
+    )

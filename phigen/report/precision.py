@@ -1,0 +1,73 @@
+"""The section about errors against step and time."""
+
+from __future__ import annotations
+
+from markupsafe import Markup
+
+from phigen.analysis.precision import Curve, Study
+from phigen.report import page
+from phigen.report.drawable import drawable
+
+#: Errors for which the time is tabulated.
+TOLERANCES = (1e-3, 1e-6, 1e-9, 1e-12)
+
+
+def precision_section(study: Study) -> Markup:
+    """Convergence, work and precision, and under which conditions they were measured."""
+    said = (
+        f"All methods solve the same problem up to t = {study.time:.9g}, {study.steps} steps of the run, with steps up "
+        f"to 64 times larger and 128 times smaller. Errors are relative, against {study.reference}, which is good to "
+        f"{page.scientific(study.floor)}."
+    )
+    blocks = [page.paragraph(said)]
+    if drawable():
+        from phigen.report import pictures
+
+        blocks.append(pictures.convergence_picture(study))
+    blocks += [page.heading("Work and precision"), page.paragraph(_conditions(study)), _to_reach(study)]
+    if drawable():
+        blocks.append(pictures.work_picture(study))
+    return page.joined([*blocks, page.fold("All numbers", _all(study))])
+
+
+def _conditions(study: Study) -> str:
+    one = (
+        "All methods are one C file, compiled with the same flags, with the vector field where it can be inlined"
+        if study.language == "C"
+        else "There was no C compiler: all methods ran in Python with NumPy, so times are mostly the interpreter's"
+    )
+    return (
+        f"{one}. Each time is the fastest of {study.rounds} repetitions, the methods taken in turn. Setting up the "
+        f"solver, once per trajectory, took {page.scientific(study.set_up)} s, which the others do not contain. Over a "
+        "short time, explicit methods of high order often need less time for the same error of the solution; they keep "
+        "Casimirs and energy no better than they solve."
+    )
+
+
+def _to_reach(study: Study) -> Markup:
+    columns = [("", "relative error of the solution"), *(("number measured", c.label) for c in study.curves)]
+    rows = [
+        (page.scientific(t, 1), [("number measured", _seconds(c, t)) for c in study.curves])
+        for t in TOLERANCES
+        if t > study.floor
+    ]
+    return page.table("Seconds until the error is no larger than this (measured)", columns, rows)
+
+
+def _seconds(curve: Curve, tolerance: float) -> str:
+    times = [p.seconds for p in curve.points if p.error <= tolerance]
+    return page.scientific(min(times)) if times else "–"
+
+
+def _all(study: Study) -> Markup:
+    columns = [("", "method and step"), ("number", "steps"), ("number", "error"), ("number", "error of Casimirs")]
+    rows = [
+        (
+            f"{c.label}, {p.step:.4g}",
+            [("number", str(p.steps)), ("number", page.scientific(p.error)), ("number", page.scientific(p.casimirs)),
+             ("number measured", page.scientific(p.seconds))],
+        )
+        for c in study.curves
+        for p in c.points
+    ]  # fmt: skip
+    return page.table("Errors and times", [*columns, ("number measured", "seconds (measured)")], rows)

@@ -1,0 +1,73 @@
+"""Figures as parts of a page: colours become variables of its style sheet, ids unique, and styles attributes.
+
+Style attributes and style elements would need an exception from the page's Content-Security-Policy.
+"""
+
+from __future__ import annotations
+
+import re
+from xml.etree import ElementTree
+
+from markupsafe import Markup
+
+from phigen.analysis.drawing.palette import PALETTE
+
+_SVG, _LINK = "{http://www.w3.org/2000/svg}", "{http://www.w3.org/1999/xlink}href"
+_NUMBER = re.compile(r"-?\d+\.\d{3,}")
+_FONT = re.compile(r"(?:(\w+) )?([\d.]+)px .*")
+#: What matplotlib writes where nothing was chosen.
+_COLOURS = {**{value: f"var(--{role})" for role, value in PALETTE.items()}, "#000000": "var(--ink)"}
+#: Pixels of a page for one point of a figure: the widest fills the column.
+PIXELS = 1.75
+#: Elements of no use in a page.
+_DROPPED = (f"{_SVG}metadata", f"{_SVG}style")
+
+
+def inlined(text: str, identifier: str, title: str, description: str) -> Markup:
+    """An SVG file of matplotlib's as an element of a page; ``identifier`` begins all of its ids."""
+    root = ElementTree.fromstring(text)
+    for parent in list(root.iter()):
+        for child in [c for c in parent if c.tag in _DROPPED]:
+            parent.remove(child)
+    for element in root.iter():
+        element.tag = element.tag.removeprefix(_SVG)
+        _plain(element)
+        _identified(element, f"{identifier}-")
+    for side in ("width", "height"):
+        root.set(side, f"{float(root.attrib[side].removesuffix('pt')) * PIXELS:.0f}")
+    root.attrib |= {"role": "img", "aria-labelledby": f"{identifier}-title {identifier}-desc"}
+    for place, (tag, words) in enumerate((("title", title), ("desc", description))):
+        about = ElementTree.Element(tag, id=f"{identifier}-{tag}")
+        about.text = words
+        root.insert(place, about)
+    return Markup(ElementTree.tostring(root, encoding="unicode", short_empty_elements=True))
+
+
+def _plain(element: ElementTree.Element) -> None:
+    """Style as attributes, colours as variables, numbers with two decimals."""
+    for declaration in element.attrib.pop("style", "").split(";"):
+        name, _, value = (part.strip() for part in declaration.partition(":"))
+        font = _FONT.fullmatch(value) if name == "font" else None
+        if font:
+            element.set("font-size", font[2])
+            if font[1] == "italic":
+                element.set("font-style", "italic")
+        elif name and name not in ("font-family", "font"):
+            element.set(name, value)
+    for name, value in element.attrib.items():
+        if name in ("fill", "stroke"):
+            element.set(name, _COLOURS.get(value, value))
+        elif name not in ("id", "href", _LINK):
+            element.set(name, _NUMBER.sub(lambda m: f"{float(m[0]):.2f}", value))
+
+
+def _identified(element: ElementTree.Element, prefix: str) -> None:
+    """Ids and references to them with a prefix."""
+    for name, value in list(element.attrib.items()):
+        if name == "id":
+            element.set(name, prefix + value)
+        elif value.startswith("url(#"):
+            element.set(name, f"url(#{prefix}{value[5:]}")
+        elif name in ("href", _LINK) and value.startswith("#"):
+            element.attrib.pop(name)
+            element.set("href", f"#{prefix}{value[1:]}")

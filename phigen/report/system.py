@@ -1,0 +1,58 @@
+"""The section about the system: π, H, Casimirs, the equations of motion, parameters."""
+
+from __future__ import annotations
+
+from markupsafe import Markup
+
+from phigen.analysis import mathml, parts
+from phigen.geometry.system import System
+from phigen.report import page
+from phigen.report.equations import group
+from phigen.report.known import MOTION
+
+#: Matrices of more rows, or of more names and numbers, are shown as brackets.
+ROWS, ENTRIES = 6, 90
+
+
+def system_section(system: System) -> Markup:
+    """Everything that the spec says of the system, as formulas."""
+    named = [("H", system.hamiltonian), *system.casimirs.items(), *system.invariants.items()]
+    blocks = [
+        page.paragraph(f"Poisson tensor: {system.shape}.", "note"),
+        _tensor(system),
+        page.heading("Hamiltonian, Casimirs and invariants"),
+        _kinds(system),
+        group([mathml.name(n) for n, _ in named], [e for _, e in named], "H, Casimirs and invariants"),
+        page.heading("Equations of motion"),
+        page.equations([MOTION]),
+        group([mathml.dotted(c) for c in system.coordinates], system.vector_field(), "The equations of motion"),
+    ]
+    return page.joined([*blocks, _parameters(system)] if system.parameters else blocks)
+
+
+def _tensor(system: System) -> Markup:
+    entries = [e for row in system.poisson for e in row]
+    if system.dimension <= ROWS and sum(map(parts.leaves, entries)) <= ENTRIES:
+        return page.equations([[mathml.math(f"<mi>π</mi><mo>=</mo>{mathml.matrix(system.poisson)}")]])
+    names, n = system.coordinates, system.dimension
+    pairs = [(i, j) for i in range(n) for j in range(i + 1, n) if not system.poisson[i][j].is_zero]
+    left = [mathml.bracket(names[i], names[j]) for i, j in pairs]
+    return group(left, [system.poisson[i][j] for i, j in pairs], "The brackets that are not zero")
+
+
+def _kinds(system: System) -> Markup:
+    """What each name stands for."""
+    declared = [c for c in system.casimirs if c in system.declared]
+    found = [c for c in system.casimirs if c not in system.declared]
+    kinds = [("Casimirs of the spec", declared), ("Casimirs that phigen found", found)]
+    kinds.append(("further invariants", list(system.invariants)))
+    said = "; ".join(f"{kind}: {', '.join(names)}" for kind, names in kinds if names) or "no Casimirs or invariants"
+    return page.paragraph(f"{said[0].upper()}{said[1:]}.", "note")
+
+
+def _parameters(system: System) -> Markup:
+    rows = []
+    for p in system.parameters:
+        about = f"{p.description} (positive)".strip() if p.positive else p.description
+        rows.append((Markup(mathml.math(mathml.name(p.name))), [("number", f"{float(p.value):.9g}"), ("", about)]))
+    return page.table("Parameters", [("", "name"), ("number", "default"), ("", "meaning")], rows)

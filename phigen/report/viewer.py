@@ -1,0 +1,74 @@
+"""What the viewer of a page is given: trajectories, thinned and rounded to what a screen can show."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from markupsafe import Markup
+
+from phigen.analysis.drawing.groups import groups
+from phigen.analysis.drawing.phase_space import joins
+from phigen.report import page
+from phigen.runtime.trajectory import Trajectory
+
+#: Numbers of all curves together, rows of one at most, and the steps to which a coordinate is rounded.
+MOST_NUMBERS, MOST_ROWS, STEPS = 90_000, 4_000, 9_999
+#: The viewer shows so many curves.
+CURVES = 2
+#: A coordinate name is cut to so many letters where there is little room.
+LETTERS = 24
+
+
+def viewer(methods: Mapping[str, Trajectory]) -> Markup:
+    """The viewer of the first trajectory and of the one beside it; nothing if there is no curve to see."""
+    shown = {label: curve for label, curve in list(methods.items())[:CURVES] if len(_finite(curve)) > 1}
+    first = next(iter(shown.values()), None)
+    if first is None:
+        return Markup("")
+    names = [*(c[:LETTERS] for c in first.coordinates), "t"]
+    given = _data(shown, names, _axes(first.coordinates))
+    options = list(enumerate(names))
+    return page.block(
+        "viewer",
+        label=f"The trajectory of {', '.join(names)}. Arrow keys turn it, plus and minus zoom, 0 resets.",
+        axes=[(axis, options) for axis in "xyz"],
+        curves=list(enumerate(shown, start=1)),
+        last=len(given["curves"][0][0]) - 1,
+        data=page.data("viewer-data", given),
+    )
+
+
+def _data(methods: Mapping[str, Trajectory], names: list[str], axes: list[int]) -> dict[str, Any]:
+    tables = [_finite(curve) for curve in methods.values()]
+    most = min(MOST_ROWS, max(2, MOST_NUMBERS // (len(tables) * len(names))))
+    stride = max(1, -(-max(map(len, tables)) // most))
+    tables = [table[::stride] for table in tables]
+    low = np.min([table.min(axis=0) for table in tables], axis=0)
+    high = np.max([table.max(axis=0) for table in tables], axis=0)
+    size = np.where(high > low, high - low, 1.0)
+    return {
+        "names": names,
+        "axes": axes,
+        "low": [float(f"{v:.9g}") for v in low],
+        "high": [float(f"{v:.9g}") for v in high],
+        "steps": STEPS,
+        "joined": joins(tables[0][:, axes]),
+        "curves": [np.rint((table - low) / size * STEPS).astype(int).T.tolist() for table in tables],
+    }
+
+
+def _finite(trajectory: Trajectory) -> Any:
+    """The rows of the coordinates and of the time, up to the first that is not finite."""
+    bad = np.flatnonzero(~np.isfinite(trajectory.x).all(axis=1))
+    end = int(bad[0]) if len(bad) else len(trajectory)
+    return np.column_stack([trajectory.x[:end], trajectory.t[:end]])
+
+
+def _axes(coordinates: tuple[str, ...]) -> list[int]:
+    """The columns to begin with: three coordinates that belong together, or two and the time."""
+    group = max(groups(coordinates), key=len)
+    chosen = [coordinates.index(c) for c in group][:3]
+    more = [i for i in range(len(coordinates)) if i not in chosen] if len(chosen) > 2 else []
+    return ([*chosen, *more][:3] + [len(coordinates)] * 3)[:3]

@@ -1,0 +1,153 @@
+"""Chromium without a window, driven through its debugging pipe: enough to load a page, act on it and look at it."""
+
+from __future__ import annotations
+
+import base64
+import json
+import os
+import select
+import subprocess
+import time
+from pathlib import Path
+from typing import Any
+
+FLAGS = ["--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-sync",
+         "--disable-background-networking", "--disable-component-update", "--remote-debugging-pipe"]  # fmt: skip
+_SECONDS = 60.0
+
+
+class Browser:
+    """A browser with one page; ``messages`` holds what the page and the browser complained about, as text."""
+
+    def __init__(self, program: str, profile: Path) -> None:
+        read_theirs, self._write = os.pipe()
+        self._read, write_theirs = os.pipe()
+
+        def connect() -> None:
+            # Chromium reads from file 3 and writes to file 4; the copies may overlap with these numbers.
+            source, sink = os.dup(read_theirs), os.dup(write_theirs)
+            os.dup2(source, 3)
+            os.dup2(sink, 4)
+
+        self._process = subprocess.Popen(
+            [program, *FLAGS, f"--user-data-dir={profile}"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+            close_fds=False, preexec_fn=connect,
+        )  # fmt: skip
+        os.close(read_theirs)
+        os.close(write_theirs)
+        self._count, self._buffer = 0, b""
+        self._events: list[dict[str, Any]] = []
+        self._session = ""
+        target = self.call("Target.createTarget", url="about:blank")["targetId"]
+        self._session = self.call("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
+        for domain in ("Page", "Runtime", "Log", "Network"):
+            self.call(f"{domain}.enable")
+
+    def close(self) -> None:
+        """End the browser."""
+        self._session = ""
+        try:
+            self._send("Browser.close", {})
+            self._process.wait(10)
+        except (OSError, subprocess.TimeoutExpired):
+            self._process.kill()
+            self._process.wait()
+        os.close(self._write)
+        os.close(self._read)
+
+    def call(self, method: str, **parameters: Any) -> dict[str, Any]:
+        """The result of a command of the DevTools protocol."""
+        number = self._send(method, parameters)
+        while True:
+            message = self._receive()
+            if message.get("id") == number:
+                if "error" in message:
+                    raise RuntimeError(f"{method}: {message['error']}")
+                return dict(message["result"])
+
+    def load(self, page: Path) -> None:
+        """Show a file, and wait until it is there."""
+        self._events.clear()
+        self.call("Page.navigate", url=page.as_uri())
+        while not any(e["method"] == "Page.loadEventFired" for e in self._events):
+            self._receive()
+
+    def value(self, script: str) -> Any:
+        """The value of an expression of JavaScript in the page."""
+        done = self.call("Runtime.evaluate", expression=script, returnByValue=True, awaitPromise=True)
+        if "exceptionDetails" in done:
+            raise RuntimeError(done["exceptionDetails"])
+        return done["result"].get("value")
+
+    def media(self, kind: str = "", **features: str) -> None:
+        """Pretend to be a screen or a printer, with features such as prefers_color_scheme="dark"."""
+        listed = [{"name": name.replace("_", "-"), "value": value} for name, value in features.items()]
+        self.call("Emulation.setEmulatedMedia", media=kind, features=listed)
+
+    def size(self, width: int, height: int) -> None:
+        """The size of the window."""
+        self.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=False)
+
+    def key(self, name: str) -> None:
+        """Press a key."""
+        for kind in ("keyDown", "keyUp"):
+            self.call("Input.dispatchKeyEvent", type=kind, key=name, code=name)
+
+    def drag(self, x: float, y: float, dx: float, dy: float) -> None:
+        """Press the mouse button at a point, move, and let go."""
+        self.call("Input.dispatchMouseEvent", type="mousePressed", x=x, y=y, button="left", buttons=1, clickCount=1)
+        for part in (0.5, 1.0):
+            at = {"x": x + part * dx, "y": y + part * dy}
+            self.call("Input.dispatchMouseEvent", type="mouseMoved", button="left", buttons=1, **at)
+        self.call("Input.dispatchMouseEvent", type="mouseReleased", x=x + dx, y=y + dy, button="left", clickCount=1)
+
+    def pdf(self) -> bytes:
+        """The page as it would be printed."""
+        return base64.b64decode(self.call("Page.printToPDF")["data"])
+
+    def picture(self, path: Path) -> None:
+        """The whole page as a PNG file."""
+        data = self.call("Page.captureScreenshot", captureBeyondViewport=True)["data"]
+        path.write_bytes(base64.b64decode(data))
+
+    @property
+    def complaints(self) -> list[str]:
+        """Errors and warnings of the console, uncaught exceptions, violations of the policy, failed requests."""
+        found = []
+        for event in self._events:
+            told = event["params"]
+            if event["method"] == "Runtime.exceptionThrown":
+                found.append(str(told["exceptionDetails"]))
+            elif event["method"] == "Runtime.consoleAPICalled" and told["type"] in ("error", "warning", "assert"):
+                found.append(str(told["args"]))
+            elif event["method"] == "Log.entryAdded":
+                found.append(str(told["entry"]))
+        return found
+
+    @property
+    def requests(self) -> list[str]:
+        """The addresses of everything that was asked for since the page was loaded."""
+        asked = (e["params"]["request"]["url"] for e in self._events if e["method"] == "Network.requestWillBeSent")
+        return [url for url in asked if not url.startswith("data:")]
+
+    def _send(self, method: str, parameters: dict[str, Any]) -> int:
+        self._count += 1
+        message: dict[str, Any] = {"id": self._count, "method": method, "params": parameters}
+        if self._session:
+            message["sessionId"] = self._session
+        os.write(self._write, json.dumps(message).encode() + b"\0")
+        return self._count
+
+    def _receive(self) -> dict[str, Any]:
+        end = time.monotonic() + _SECONDS
+        while b"\0" not in self._buffer:
+            ready, _, _ = select.select([self._read], [], [], max(0.0, end - time.monotonic()))
+            part = os.read(self._read, 1 << 20) if ready else b""
+            if not part:
+                raise RuntimeError(f"chromium said nothing for {_SECONDS:g} s, or ended")
+            self._buffer += part
+        text, self._buffer = self._buffer.split(b"\0", 1)
+        message: dict[str, Any] = json.loads(text)
+        if "method" in message:
+            self._events.append(message)
+        return message

@@ -1,0 +1,52 @@
+"""One page of a spec whose texts are attacks, made once for all tests of a session."""
+
+import json
+
+import pytest
+from click.testing import CliRunner
+
+from phigen.cli import group
+
+ATTACK = "</title></style></script></p>--><script>window.broken = 1</script><img src=x onerror='broken=1'>&amp;\"]]>"
+QUOTED = json.dumps(ATTACK)
+
+SPEC = f"""\
+phigen: 1
+name: attack
+title: {QUOTED}
+description: |
+  Two lines: {ATTACK}
+  {{{{ 7*7 }}}} {{% raw %}} </math><mtext><a href="javascript:broken=1">x</a>
+references: [{QUOTED}, "https://example.org/?a=1&b=<2>"]
+coordinates: [x1, x2, alert]
+parameters:
+  I1: {{value: 2, positive: true, description: {QUOTED}}}
+poisson:
+  brackets: {{x1: {{x2: -alert, alert: x2}}, x2: {{alert: -x1}}}}
+hamiltonian: x1**2/I1/2 + x2**2/4 + alert**2/6
+order: 2
+runs:
+  constructor:
+    description: {QUOTED}
+    initial: [0.3, 1, 0.2]
+    step: 0.1
+    steps: 40
+    compare: [rk4]
+    section: x1
+"""
+
+
+@pytest.fixture(scope="session")
+def made(tmp_path_factory, compiled_solvers):
+    """The path of the page."""
+    folder = tmp_path_factory.mktemp("report")
+    (folder / "attack.yaml").write_text(SPEC, encoding="utf-8")
+    arguments = ["report", str(folder / "attack.yaml"), "--lyapunov", "--quick", "-o", str(folder / "attack.html")]
+    done = CliRunner().invoke(group, arguments, prog_name="phigen")
+    assert done.exit_code == 0, done.output
+    return folder / "attack.html"
+
+
+@pytest.fixture(scope="session")
+def html(made):
+    return made.read_text(encoding="utf-8")

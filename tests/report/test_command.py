@@ -1,0 +1,105 @@
+"""phigen report: what it writes, and what it does when something fails."""
+
+from pathlib import Path
+
+import pytest
+from cli_specs import GOOD, NOT_POISSON
+from click.testing import CliRunner
+from html_check import Page
+
+from phigen.analysis import verification
+from phigen.cli import group
+
+
+@pytest.fixture
+def phigen(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    # Figures have their own tests, and take their time.
+    for module in ("phigen.report.document", "phigen.report.precision", "phigen.report.drawable"):
+        monkeypatch.setattr(f"{module}.drawable", lambda: False)
+    return lambda *args: CliRunner().invoke(group, ["report", *map(str, args)], prog_name="phigen")
+
+
+def write(text=GOOD):
+    Path("a.yaml").write_text(text.format(name="a", order=2) if text is GOOD else text, encoding="utf-8")
+    return "a.yaml"
+
+
+def test_page_is_written_beside_and_messages_go_to_stderr(phigen):
+    done = phigen(write(), "--quick")
+    assert done.exit_code == 0
+    assert done.stdout == ""
+    assert "wrote a.html" in done.stderr
+    assert "matplotlib was not installed" in done.stderr
+    text = Path("a.html").read_text(encoding="utf-8")
+    assert Page(text).errors == []
+    assert "solution, against the closed form" in text
+    assert "the closed form" in text
+    assert "no figures" in text
+
+
+def test_page_can_go_to_stdout(phigen):
+    done = phigen(write(GOOD.split("runs:")[0].format(name="a", order=2)), "-o", "-", "-q")
+    assert done.exit_code == 0
+    assert Page(done.stdout).errors == []
+    assert not Path("a.html").exists()
+    assert done.stderr == ""
+
+
+def test_spec_without_runs_has_a_page_that_says_so(phigen):
+    done = phigen(write(GOOD.split("runs:")[0].format(name="a", order=2)))
+    assert done.exit_code == 0
+    assert "warning" in done.stderr
+    assert "nothing was measured" in Path("a.html").read_text(encoding="utf-8")
+
+
+def test_refuted_mathematics_has_no_page(phigen):
+    done = phigen(write(NOT_POISSON), "-o", "x.html")
+    assert done.exit_code == 5
+    assert "Jacobi identity" in done.stderr
+    assert not Path("x.html").exists()
+
+
+def test_failing_run_has_a_page_that_says_where(phigen):
+    text = GOOD.format(name="a", order=2).replace("(q**2 + p**2)/2", "p**2/2 - 1/q**2").replace("step: 0.1", "step: 2")
+    done = phigen(write(text), "--quick")
+    assert done.exit_code == 7
+    page = Path("a.html").read_text(encoding="utf-8")
+    assert Page(page).errors == []
+    assert "The run could not be completed" in page
+
+
+def test_solver_that_falls_short_has_a_page_with_the_verdict(phigen, monkeypatch):
+    monkeypatch.setattr(verification, "ONE_STEP", 0.0)
+    done = phigen(write(), "--quick")
+    assert done.exit_code == 5
+    assert "verification failed" in done.stderr
+    page = Path("a.html").read_text(encoding="utf-8")
+    assert "✗ failed" in page
+    assert Page(page).errors == []
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code"),
+    [(["--run", "walk"], 2), (["-o", "no/such/folder.html"], 2), (["-o", "."], 2), (["--order", "99"], 2)],
+)
+def test_wrong_usage_is_noticed_before_the_work(phigen, arguments, code):
+    done = phigen(write(), *arguments)
+    assert done.exit_code == code
+    assert not list(Path().glob("*.html"))
+
+
+def test_missing_file_is_an_error_of_the_spec(phigen):
+    done = phigen("none.yaml")
+    assert done.exit_code == 1
+    assert "there is no file" in done.stderr
+
+
+def test_without_compiler_times_are_those_of_python(phigen, monkeypatch):
+    monkeypatch.setenv("CC", "/there/is/none")
+    text = GOOD.format(name="a", order=2).replace("steps: 50", "steps: 4")
+    done = phigen(write(text), "--quick")
+    assert done.exit_code == 0
+    page = Path("a.html").read_text(encoding="utf-8")
+    assert "There was no C compiler" in page
+    assert "generated for NumPy" in page

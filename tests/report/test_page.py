@@ -1,0 +1,261 @@
+"""The page of a spec: whole, harmless whatever the spec says, readable by everyone."""
+
+import base64
+import hashlib
+import json
+import re
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from html_check import Page
+from support import compiled
+
+from phigen import resources
+from phigen.analysis.drawing.palette import PALETTE
+from phigen.analysis.proof import Examination
+from phigen.analysis.summary import Drift, Summary
+from phigen.compiler import compile_spec
+from phigen.report import document as pages
+from phigen.report import page
+from phigen.report.material import Material
+from phigen.report.svg import inlined
+from phigen.report.viewer import MOST_NUMBERS, viewer
+from phigen.runtime.trajectory import Trajectory
+from phigen.symbolic.verdict import CHECKED, PROVED, Statement
+
+NO_DRIFT = Drift(0.0, True, 1.0)
+SUMMARY = Summary("phigen", NO_DRIFT, {"C": NO_DRIFT}, {}, None, (0.0,), 3, 3)
+ASSETS = resources.templates() / "report"
+CSS = (ASSETS / "report.css").read_text(encoding="utf-8")
+
+
+def trajectory(x, names=("x", "y", "z")):
+    t = np.arange(len(x), dtype=float)
+    return Trajectory(t=t, x=x, energy=t, casimirs={}, steps=len(x), h=1.0, parameters={}, coordinates=names)
+
+
+def bare(compilation, **more):
+    """The page of a system of which nothing was measured."""
+    return pages.document(
+        Material(Examination(compilation.spec, {}, compilation), compilation, "phigen report", **more)
+    )
+
+
+# -- one page with everything, of a hostile spec
+
+
+def test_page_is_sound_html_that_loads_nothing(html):
+    assert Page(html).errors == []
+
+
+def test_page_has_all_its_sections(html):
+    found = [given["id"] for given in Page(html).all("section")]
+    assert found == ["brief", "system", "choices", "method", "proofs", "measured", "run", "precision", "provenance"]
+    figures = {given["id"] for given in Page(html).all("figure")}
+    assert figures == {f"figure-{n}" for n in ("trajectory", "errors", "section", "lyapunov", "convergence", "work")}
+
+
+def test_texts_of_the_spec_stay_texts(html):
+    found = Page(html)
+    assert [given for given in found.all("script") if given.get("type") != "application/json"] == [{}]
+    assert "<script>window" not in html
+    assert "javascript:broken" not in str([given for _, given in found.elements])
+    assert any("</title></style></script>" in text for text in found.texts["h1"])
+    assert any("{{ 7*7 }}" in text for text in found.texts["p"])
+
+
+def test_policy_allows_the_own_style_and_scripts_and_nothing_else(html):
+    policy = next(g["content"] for g in Page(html).all("meta") if g.get("http-equiv") == "Content-Security-Policy")
+    rules = dict(rule.strip().split(" ", 1) for rule in policy.split(";"))
+    assert rules["default-src"] == "'none'"
+    for tag, rule in (("style", "style-src"), ("script", "script-src")):
+        (content,) = re.findall(rf"<{tag}>(.*?)</{tag}>", html, re.DOTALL)
+        digest = base64.b64encode(hashlib.sha256(content.encode()).digest()).decode()
+        assert rules[rule] == f"'sha256-{digest}'"
+
+
+def test_page_says_how_to_make_it_again(html, made):
+    assert hashlib.sha256((made.parent / "attack.yaml").read_bytes()).hexdigest() in html
+    assert "phigen report attack.yaml --lyapunov --quick -o attack.html" in html
+    assert str(made.parent) not in html
+
+
+def test_figures_are_named_and_take_their_colours_from_the_page(html):
+    for text in re.findall(r"<svg.*?</svg>", html, re.DOTALL):
+        assert "<title" in text
+        assert "<desc" in text
+        assert not re.search(r"#[0-9a-fA-F]{6}", text)
+        assert "var(--ink)" in text
+
+
+def test_measured_times_are_marked(html):
+    found = Page(html)
+    assert sum("measured" in given.get("class", "") for given in found.all("td")) > 10
+    assert any("measured" in text for text in found.texts["caption"])
+
+
+# -- systems of every kind, without measurements
+
+
+@pytest.mark.parametrize("name", ["pendulum_euler", "poisson_not_hamiltonian", "guiding_centre", "spin_chain5"])
+def test_page_without_measurements_is_sound(name):
+    text = bare(compiled(name))
+    assert Page(text).errors == []
+    assert "<math" in text
+    assert len(text.encode()) < 1_000_000
+
+
+def test_page_of_a_splitting_shows_its_flows():
+    compilation = compile_spec(compiled("henon_heiles").spec, scheme="splitting")
+    text = bare(compilation)
+    assert Page(text).errors == []
+    assert "The 21 flows of one step" in text
+    assert "Bi-realisation" not in text
+
+
+def test_without_matplotlib_the_page_says_so_always_in_the_same_way(monkeypatch):
+    monkeypatch.setattr(pages, "drawable", lambda: False)
+    curve = trajectory(np.eye(3), compiled("rigid_body").system.coordinates)
+    run = SimpleNamespace(name="r", stride=1, description="")
+    text = bare(compiled("rigid_body"), run=run, methods={"phigen": curve}, summaries=(SUMMARY,))
+    assert Page(text).errors == []
+    assert text == bare(compiled("rigid_body"), run=run, methods={"phigen": curve}, summaries=(SUMMARY,))
+    assert "matplotlib was not installed" in text
+    assert "viewer-data" in text
+    assert "<svg" not in text
+
+
+def test_a_wrong_statement_stands_out():
+    compilation = compiled("rigid_body")
+    groups = {"Poisson tensor": (Statement("A <b>", PROVED), Statement("C_1 = 1e-16", CHECKED, "8 points"))}
+    text = pages.document(Material(Examination(compilation.spec, groups, compilation), compilation, ""))
+    assert "1 of 2" in text
+    assert "C<sub>1</sub> = 1·10<sup>−16</sup>" in text
+    assert "A &lt;b&gt;" in text
+
+
+def test_a_long_spec_is_cut():
+    compilation = compiled("rigid_body")
+    spec = replace(compilation.spec, source="# <&>" * 100_000)
+    text = bare(replace(compilation, spec=spec))
+    assert len(text.encode()) < 1_000_000
+    assert f"the first {pages.SOURCE} of 500000 characters" in text
+
+
+# -- parts
+
+
+@pytest.mark.parametrize(
+    ("value", "shown"),
+    [(3.14e-8, "3.1·10⁻⁸"), (0, "0"), (5.976, "5.98"), (-2.5e-3, "−2.5·10⁻³"), (1234567.0, "1.2·10⁶"), (0.0123, "0.01"),
+     (float("inf"), "∞"), (float("-inf"), "−∞"), (float("nan"), "–"), (-1.5, "−1.50"), (1e-300, "1.0·10⁻³⁰⁰")],
+)  # fmt: skip
+def test_numbers_to_read(value, shown):
+    assert page.scientific(value) == shown
+
+
+def test_typeset_escapes_and_writes_formulas():
+    assert page.typeset("<i> S_1 + t^5 S_5, p_x3**2, 1.6e-13, α_i & a_b") == (
+        "&lt;i&gt; S<sub>1</sub> + t<sup>5</sup> S<sub>5</sub>, p<sub>x3</sub><sup>2</sup>, 1.6·10<sup>−13</sup>, "
+        "α<sub>i</sub> &amp; a<sub>b</sub>"
+    )
+
+
+def test_figure_keeps_no_style_and_has_ids_of_its_own():
+    svg = (
+        '<svg xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink" width="9pt" height="9pt">'
+        '<metadata>x</metadata><defs><style type="text/css">*{fill:red}</style></defs>'
+        '<path id="m" style="stroke: #0072b2"/><g clip-path="url(#c)"><use xlink:href="#m" x="1.23456"/>'
+        '<text style="font: italic 9px \'DejaVu\'">a &lt; b</text></g><clipPath id="c"/></svg>'
+    )
+    text = str(inlined(svg, "one", "A <title>", "what & why"))
+    assert not re.search(r"<style| style=", text)
+    assert "metadata" not in text
+    assert 'stroke="var(--series-1)"' in text
+    assert 'id="one-m"' in text
+    assert 'href="#one-m"' in text
+    assert 'clip-path="url(#one-c)"' in text
+    assert 'font-size="9"' in text
+    assert 'x="1.23"' in text
+    assert "A &lt;title&gt;" in text
+
+
+def viewer_data(methods):
+    return json.loads(re.search(r'id="viewer-data">(.*?)</script>', str(viewer(methods)))[1])
+
+
+def test_viewer_holds_the_curve_to_what_a_screen_shows():
+    angle = np.linspace(0, 6, 500)
+    x = np.column_stack([np.cos(angle), 5 + np.sin(angle), angle])
+    data = viewer_data({"a": trajectory(x)})
+    low, high = np.array(data["low"]), np.array(data["high"])
+    shown = low[:, None] + (high - low)[:, None] * np.array(data["curves"][0]) / data["steps"]
+    assert np.max(np.abs(shown[:3].T - x)) < 1e-3
+    assert data["axes"] == [0, 1, 2]
+    assert data["joined"]
+
+
+@pytest.mark.parametrize(("dimension", "axes"), [(1, [0, 1, 1]), (2, [0, 1, 2]), (4, [0, 1, 4]), (300, None)])
+def test_viewer_is_bounded_and_has_axes_for_every_dimension(dimension, axes):
+    names = ("q1", "q2", "p1", "p2") if dimension == 4 else tuple(f"x{i}" for i in range(dimension))
+    x = np.random.default_rng(1).normal(size=(20_000 if dimension > 4 else 200, dimension))
+    data = viewer_data({"a": trajectory(x, names), "b": trajectory(x, names), "c": trajectory(x, names)})
+    assert len(data["curves"]) == 2
+    assert sum(len(column) for curve in data["curves"] for column in curve) <= 1.1 * MOST_NUMBERS
+    if axes and dimension != 4:
+        assert data["axes"] == axes
+
+
+def test_viewer_ends_where_a_method_broke_down():
+    x = np.ones((10, 3)).cumsum(axis=0)
+    broken = np.where(np.arange(10)[:, None] < 4, x, np.nan)
+    data = viewer_data({"phigen": trajectory(x), "<rk4>": trajectory(broken)})
+    assert [len(curve[0]) for curve in data["curves"]] == [10, 4]
+    assert "&lt;rk4&gt;" in viewer({"phigen": trajectory(x), "<rk4>": trajectory(broken)})
+
+
+def test_no_name_ends_the_data_of_the_viewer():
+    text = str(page.data("d", ["</script><script>", "\u2028", "<!--"]))
+    assert text.count("<") == 2
+
+
+# -- colours, templates
+
+
+def colours():
+    return {n: pair for n, *pair in re.findall(r"--([a-z0-9-]+): light-dark\((#\w{6}), (#\w{6})\)", CSS)}
+
+
+def luminance(colour):
+    parts = [int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5)]
+    linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in parts]
+    return sum(w * c for w, c in zip((0.2126, 0.7152, 0.0722), linear, strict=True))
+
+
+@pytest.mark.parametrize("theme", [0, 1], ids=["light", "dark"])
+@pytest.mark.parametrize("ground", ["paper", "raised"])
+def test_texts_and_curves_have_contrast(theme, ground):
+    given = colours()
+    for name in set(given) - {"paper", "raised", "grid", "leaf"}:
+        a, b = sorted((luminance(given[n][theme]) for n in (name, ground)), reverse=True)
+        assert (a + 0.05) / (b + 0.05) >= 4.5, name
+
+
+def test_page_has_a_variable_for_every_colour_of_the_figures():
+    assert set(PALETTE) <= set(colours())
+
+
+@pytest.mark.parametrize("name", ["report.css", "theme.js", "viewer.js"])
+def test_assets_cannot_leave_their_elements(name):
+    text = (ASSETS / name).read_text(encoding="utf-8")
+    assert "</" not in text
+    assert "<!--" not in text
+    assert "http" not in text
+    assert "innerHTML" not in text
+
+
+def test_templates_escape():
+    assert page._environment().autoescape
+    assert page.paragraph("<script>") == '<p class="">&lt;script&gt;</p>'
