@@ -9,6 +9,7 @@ trajectory = solver.integrate([1, 1, 1], h=0.05, steps=20_000, stride=10, I2=2.5
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from os import PathLike
 from typing import TYPE_CHECKING
 
@@ -22,7 +23,7 @@ from phigen.spec.model import Extras, Spec
 from phigen.spec.names import IDENTIFIER, KEYWORDS, SCHEMES, SPEC_NAME
 
 if TYPE_CHECKING:
-    from phigen.runtime.interface import Interface
+    from phigen.runtime.interface import Backend, Interface
     from phigen.runtime.solver import Solver
     from phigen.scheme.program import Program
 
@@ -92,20 +93,20 @@ def compilation_of(
 
 def solver_of(compilation: Compilation, target: str = "auto") -> Solver:
     """The loaded solver of a compilation. Raises `ToolchainError` if C was asked for and cannot be compiled."""
-    from phigen.runtime.c_solver import CSolver
-    from phigen.runtime.interface import Backend
-    from phigen.runtime.numpy_solver import NumpySolver
     from phigen.runtime.solver import Solver
 
     program, interface = compilation.program, interface_of(compilation.program)
-    target = chosen_target(target)
-    files = emit(program, target, f"phigen build {program.name}.yaml")
-    backend: Backend
-    if target == "c":
-        backend = CSolver.compile(files, interface)
-    else:
-        backend = NumpySolver.from_source(files[f"{program.name}.py"], interface)
-    return Solver(backend, interface)
+    files = emit(program, chosen_target(target), f"phigen build {program.name}.yaml")
+    return Solver(backend_of(files, interface), interface)
+
+
+def backend_of(files: Mapping[str, str], interface: Interface) -> Backend:
+    """The back end of generated files (name → text) of one target. Raises `ToolchainError`."""
+    from phigen.runtime.c_solver import CSolver
+    from phigen.runtime.numpy_solver import NumpySolver
+
+    module = files.get(f"{interface.name}.py")
+    return NumpySolver.from_source(module, interface) if module else CSolver.compile(files, interface)
 
 
 def interface_of(program: Program) -> Interface:

@@ -55,12 +55,13 @@ def command(
 ) -> None:
     """Find the cheapest bi-realisation, order, gauge, composition and step for an accuracy.
 
-    Builds candidates, compiles them as C, measures the error and the time of each over a piece of a run of the spec,
-    confirms the best ones over the whole horizon if that is affordable, and prints the lines to paste into the spec.
-    Classical methods in C stand beside them. Exit code 5 if nothing reaches the accuracy.
+    Builds candidates, compiles them as C (without a compiler: as NumPy), measures error and time of each over a piece
+    of a run of the spec, confirms the best over the whole horizon if that is affordable, and prints the lines to paste
+    into the spec. Classical methods stand beside them. Exit code 5 if nothing reaches the accuracy.
     """
     from phigen.analysis.proof import compile_proved
     from phigen.analysis.tuning.study import tune
+    from phigen.api import chosen_target
 
     _expect_positive(horizon, "--horizon")
     _expect_positive(budget, "--budget")
@@ -69,6 +70,8 @@ def command(
     spec = load_one(spec_file)
     experiment = prepared(spec, name, settings=settings)
     compilation = compile_proved(spec)
+    if chosen_target("auto") == "numpy":
+        console.note("no C compiler found: timing the NumPy target; install gcc or clang, or name one in CC")
     problem = problem_of(compilation.system, experiment, horizon)
     found = tune(compilation, problem, measure, accuracy, budget, console.note)
     if plot:

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 _OTHERS = (1e4, 1e2, 1e-2, 1e-4)
 #: An error so much below the accuracy did not decide the step.
 _SLACK = 20
+#: States that the proposed run stores.
+_ROWS = 1000
 
 
 def print_tuning(found: Tuning, spec: Spec, run: Run) -> None:
@@ -27,7 +29,7 @@ def print_tuning(found: Tuning, spec: Spec, run: Run) -> None:
     out(
         heading(f"{spec.name}, run {run.name}") + f": {what} at most {found.accuracy:g} up to t = {found.horizon:.9g}\n"
     )
-    rows = [["", "order", "gauge", "scheme", "step", "error", "ns/step", "ms/unit time", "ratio"]]
+    rows = [["", "order", "gauge", "scheme", "step", "error", "ns/step", "run, ms", "ratio"]]
     rows += [_row(f, label, found) for label, f in listed(found)]
     for line in table(rows, right=[1, 4, 5, 6, 7, 8]):
         out(f"  {line}")
@@ -36,13 +38,13 @@ def print_tuning(found: Tuning, spec: Spec, run: Run) -> None:
         out(f"  {remark}")
     if others := _other_rows(found):
         out("")
-        for line in table([["by the scans, for", "error", "step", "ms/unit time"], *others], right=[1, 2, 3]):
+        for line in table([["by the scans, for", "error", "step", "run, ms"], *others], right=[1, 2, 3]):
             out(f"  {line}")
     assert found.winner is not None
     out("\nTo paste into the spec, instead of lines with the same keys" + (" and of terms:\n" if spec.terms else ":\n"))
     out("\n".join(lines_of(found.winner)))
-    out(f"\nand into its run {run.name}:\n")
-    out("\n".join(f"    {line}" for line in run_lines_of(found.winner, run)))
+    out(f"\nand into its run {run.name}, instead of step, stride, and steps or duration:\n")
+    out("\n".join(f"    {line}" for line in run_lines_of(found, run)))
 
 
 def listed(found: Tuning) -> Iterator[tuple[str, Finalist]]:
@@ -61,7 +63,7 @@ def _row(finalist: Finalist, label: str, found: Tuning) -> list[str]:
     cells = [label, str(curve.order), gauge_of(curve), scheme_of(curve), f"{point.step:.6g}"]
     error = f"{point.error:.1e}" if is_measured(finalist, found) else f"~{point.error:.1e}"
     ratio = finalist.cost / best.cost
-    times = [f"{1e9 * finalist.cost * point.step:.0f}", f"{1e3 * finalist.cost:.3g}"]
+    times = [f"{1e9 * finalist.cost * point.step:.0f}", f"{1e3 * finalist.cost * found.horizon:.3g}"]
     return [*cells, error, *times, f"{ratio:.2f}" if ratio < 100 else f"{ratio:.0f}"]
 
 
@@ -97,7 +99,6 @@ def remarks(found: Tuning) -> Iterator[str]:
     best = found.winner
     assert best is not None
     over, whole = best.point.time, found.horizon
-    yield f"A run up to t = {whole:.6g} takes {_seconds(best.cost * whole)} of CPU time."
     if is_measured(best, found):
         yield "Errors were measured up to there" + _extrapolated(found)
     elif found.measure == "energy":
@@ -106,8 +107,14 @@ def remarks(found: Tuning) -> Iterator[str]:
         yield f"Errors were measured up to t = {over:.4g}; phigen's grow linearly, and so does ~ up to t = {whole:.6g}."
     if best.point.error * _SLACK < found.accuracy and best.point.step > 0.9 * best.curve.largest:
         yield "The accuracy would allow a larger step, but none can be made, or it would not show the motion."
-        if found.measure == "energy":
-            yield "How exact the orbit is, the energy does not tell here: see --measure orbit."
+    if found.orbit_error is not None:
+        yield (
+            f"The orbit itself is off by {found.orbit_error:.1e} of its size at most up to t = {found.piece:.4g}: "
+            "--measure orbit bounds that."
+        )
+    for label, peer in ((p.curve.label, p) for p in found.peers if p.cost < best.cost):
+        share = peer.cost / best.cost
+        yield f"{label} is cheaper: {share:.2g} of the time. It keeps neither Casimirs nor the geometry of phase space."
     for setting, why in found.refused.items():
         yield f"Not measured: {setting.described()}: {why}."
     if not found.finished:
@@ -117,10 +124,6 @@ def remarks(found: Tuning) -> Iterator[str]:
 def _extrapolated(found: Tuning) -> str:
     rest = [label for label, f in listed(found) if not is_measured(f, found)]
     return f"; those with ~ are extrapolated ({', '.join(rest)})." if rest else "."
-
-
-def _seconds(value: float) -> str:
-    return f"{value:.3g} s" if value >= 1 else f"{1e3 * value:.3g} ms"
 
 
 def _other_rows(found: Tuning) -> list[list[str]]:
@@ -133,7 +136,7 @@ def _other_rows(found: Tuning) -> list[list[str]]:
         curve = min(curves, key=lambda c: c.cost(accuracy), default=None)
         step, cost = cheapest_step(curve.points, accuracy, curve.order) if curve else (0.0, math.inf)
         if curve and math.isfinite(cost):
-            rows.append([curve.title, f"{accuracy:.0e}", f"{step:.2g}", f"{1e-6 * cost:.2g}"])
+            rows.append([curve.title, f"{accuracy:.0e}", f"{step:.2g}", f"{1e-6 * cost * found.horizon:.2g}"])
     return rows
 
 
@@ -144,10 +147,12 @@ def lines_of(finalist: Finalist) -> list[str]:
     return replace(setting, order=finalist.curve.order).lines()
 
 
-def run_lines_of(finalist: Finalist, run: Run) -> list[str]:
-    """The lines of the run, which covers the time that it covered before."""
-    step = math.copysign(finalist.point.step, run.step)
-    return [f"step: {step!r}", f"steps: {max(1, round(float(run.step) * run.steps / step))}"]
+def run_lines_of(found: Tuning, run: Run) -> list[str]:
+    """The lines of the run, up to the horizon; long enough strides let a solver take its steps in blocks."""
+    assert found.winner is not None
+    step = found.winner.point.step
+    steps = max(1, round(found.horizon / step))
+    return [f"step: {math.copysign(step, run.step)!r}", f"steps: {steps}", f"stride: {max(1, steps // _ROWS)}"]
 
 
 def unreached(found: Tuning) -> str:
@@ -178,9 +183,10 @@ def described(found: Tuning, spec: Spec, run: Run) -> dict[str, Any]:
         "horizon": found.horizon,
         "scanned": found.piece,
         "finished": found.finished,
+        "orbit_error": found.orbit_error,
         "winner": _finalist(found.winner) if found.winner else None,
         "lines": lines_of(found.winner) if found.winner else [],
-        "run_lines": run_lines_of(found.winner, run) if found.winner else [],
+        "run_lines": run_lines_of(found, run) if found.winner else [],
         "finalists": [_finalist(f) for f in found.finalists],
         "classical": [_finalist(f) for f in found.peers],
         "present": _finalist(found.present) if found.present else None,

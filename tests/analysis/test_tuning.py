@@ -12,11 +12,19 @@ from support import NAMES, compiled, described, plain
 from phigen import resources, spec
 from phigen.analysis.tuning import search
 from phigen.analysis.tuning.building import Built, Refusal, build, build_all
-from phigen.analysis.tuning.references import agreed
+from phigen.analysis.tuning.references import agreed, orbit_error
 from phigen.analysis.tuning.search import Curve, cheapest_step, proposals, scan, step_for
 from phigen.analysis.tuning.settings import OWN, SPLITTING, Setting, charts, own_setting, variants
 from phigen.analysis.tuning.study import Finalist, ranking
-from phigen.analysis.tuning.trials import MARKS, Point, Problem, energy_measure, orbit_measure
+from phigen.analysis.tuning.trials import (
+    MARKS,
+    Point,
+    Problem,
+    energy_measure,
+    marks,
+    nanoseconds_per_step,
+    orbit_measure,
+)
 from phigen.analysis.tuning.tuner import expected_seconds
 from phigen.compiler import compile_spec, emit
 from phigen.errors import CheckError
@@ -200,8 +208,8 @@ class Drifting:
         t = h * np.append(np.arange(0, steps, stride), steps)
         return np.column_stack([1 + self.rate * t + self.wobble * np.sin(t) ** 2, np.zeros_like(t)])
 
-    def there_and_back(self, h, steps, times):
-        return lambda: None
+    def walk(self, h):
+        return lambda steps: None
 
 
 def oscillator(horizon):
@@ -233,6 +241,54 @@ def test_orbit_error_is_extrapolated_linearly():
     assert point.measured == pytest.approx(1e-7, rel=0.03)
     assert point.error == pytest.approx(1e-5, rel=0.03)
     assert point.growth == pytest.approx(1.0, abs=0.02)
+
+
+class Learning:
+    """Steps of 100 ns; of 25 ns after 96 of them, if a call has 1000 to go; a call takes 2 µs."""
+
+    def __init__(self, clock):
+        self.clock = clock
+
+    def walk(self, h):
+        done, fast = 0, False
+
+        def make(steps):
+            nonlocal done, fast
+            slow = 0 if fast else min(steps, max(0, 96 - done))
+            fast = fast or steps - slow >= 1000
+            done += steps
+            self.clock[0] += 2e-6 + 100e-9 * steps - 75e-9 * (steps - slow) * fast
+
+        return make
+
+
+@pytest.mark.parametrize(("steps", "nanoseconds"), [(20, 100), (500, 100), (10**4, 26), (10**7, 25)])
+def test_time_of_a_step_is_that_of_a_whole_run_without_the_call(monkeypatch, steps, nanoseconds):
+    clock = [0.0]
+    monkeypatch.setattr(time, "thread_time", lambda: clock[0])
+    assert nanoseconds_per_step(Learning(clock), 0.1, steps) == pytest.approx(nanoseconds, rel=0.1)
+
+
+def test_orbit_is_compared_at_the_times_of_its_own_steps():
+    stride, count = marks(1000.0, 0.7)
+    assert 0.7 * stride * count <= 1000.0
+    assert 0.7 * stride * (count + 1) > 1000.0
+    states = Drifting(rate=1e-9).rows(0.7, stride * count, stride)
+    found = orbit_error(states, 0.7 * stride, Drifting(), 0.1, 1.0)
+    assert found == pytest.approx(0.7e-9 * stride * count)
+
+
+def test_orbit_error_that_grows_faster_than_linearly_is_extrapolated_so():
+    class Rounding(Drifting):
+        def rows(self, h, steps, stride):
+            t = h * np.append(np.arange(0, steps, stride), steps)
+            return np.column_stack([1 + 1e-13 * t**1.5, np.zeros_like(t)])
+
+    def solution(spacing, count):
+        return np.column_stack([np.ones(count + 1), np.zeros(count + 1)])
+
+    point = orbit_measure(oscillator(1e4), solution)(Rounding(), 0.1, 100.0)
+    assert point.error == pytest.approx(1e-13 * 1e4**1.5, rel=0.1)
 
 
 def test_references_that_disagree_are_no_reference():

@@ -30,15 +30,16 @@ def test_pasted_lines_reach_the_accuracy_at_the_proposed_step(phigen, in_tmp):
     found = json.loads(done.stdout)
     best = found["winner"]
     assert best["error"] <= 1e-6
-    assert best["seconds_per_unit_time"] <= 1.05 * min(f["seconds_per_unit_time"] for f in found["finalists"])
+    assert best["seconds_per_unit_time"] <= 1.1 * min(f["seconds_per_unit_time"] for f in found["finalists"])
     assert {c["method"] for c in found["classical"]} <= {"RK4 in C", "DOP853 in C"}
     assert "Hénon" not in done.stdout
     text = paste(path.read_text(encoding="utf-8"), found)
     Path("henon_heiles.yaml").write_text(text, encoding="utf-8")
-    run = json.loads(phigen("run", "henon_heiles.yaml", "--steps", round(500 / best["step"]), "--json").stdout)
+    run = json.loads(phigen("run", "henon_heiles.yaml", "--json").stdout)
+    assert run["step"] * run["steps"] == pytest.approx(500, abs=best["step"])
     assert (run["step"], run["order"]) == (best["step"], best["order"])
     own = run["methods"][0]
-    assert own["energy"]["error"] == pytest.approx(best["measured_error"], rel=0.05)
+    assert own["energy"]["error"] == pytest.approx(best["measured_error"], rel=0.25)  # it stores fewer states
     assert "up to t = 500" in Path("w.svg").read_text(encoding="utf-8")
 
 
@@ -81,6 +82,11 @@ def test_wrong_usage(phigen, wrong):
     assert phigen("tune", SPECS / "henon_heiles.yaml", *wrong).exit_code == 2
 
 
-def test_without_compiler_there_is_nothing_to_time(phigen, monkeypatch):
+def test_without_compiler_numpy_is_timed(phigen, monkeypatch):
     monkeypatch.setenv("CC", "/there/is/none")
-    assert phigen("tune", SPECS / "henon_heiles.yaml").exit_code == 6
+    done = phigen("tune", SPECS / "harmonic_oscillator.yaml", "--horizon", "3", "--budget", "3", "--json")
+    assert done.exit_code == 0, done.stderr
+    assert "timing the NumPy target" in done.stderr
+    found = json.loads(done.stdout)
+    assert found["winner"]["error"] <= 1e-8
+    assert {c["method"] for c in found["classical"]} <= {"RK4 in Python", "DOP853 in Python"}

@@ -11,6 +11,8 @@ if TYPE_CHECKING:
     from phigen.analysis.tuning.search import Curve
     from phigen.analysis.tuning.study import Tuning
 
+#: Larger errors are not drawn.
+_MOST = 1.0
 _MARKERS = "osD^vX"
 
 
@@ -19,34 +21,35 @@ def draw_tuning(axes: Any, found: Tuning) -> None:
     chosen = [f.curve for f in (*found.finalists, *found.peers)]
     others = [c for c in found.curves if c not in chosen and c.points]
     for curve in others:
-        axes.plot(*_coordinates(curve), color=PALETTE["grid"], linewidth=0.8, zorder=1)
+        axes.plot(*_coordinates(curve, found.horizon), color=PALETTE["grid"], linewidth=0.8, zorder=1)
     own = len(found.finalists)
     for place, finalist in enumerate((*found.finalists, *found.peers)):
         colour = SERIES[place % len(SERIES)] if place < own else PALETTE["ink"]
         axes.plot(
-            *_coordinates(finalist.curve), color=colour, linestyle=LINES[place % len(LINES)], linewidth=1.0,
-            marker=_MARKERS[place % len(_MARKERS)], markersize=3, markeredgewidth=0, zorder=3 - 0.1 * place,
-            label=finalist.curve.title,
+            *_coordinates(finalist.curve, found.horizon), color=colour, linestyle=LINES[place % len(LINES)],
+            linewidth=1.0, marker=_MARKERS[place % len(_MARKERS)], markersize=3, markeredgewidth=0,
+            zorder=3 - 0.1 * place, label=finalist.curve.title,
         )  # fmt: skip
         axes.plot(
-            1e3 * finalist.cost, finalist.point.error, "*", color=colour, markersize=11, markeredgewidth=0, zorder=4
-        )
+            1e3 * finalist.cost * found.horizon, finalist.point.error, "*", color=colour, markersize=11,
+            markeredgewidth=0, zorder=4,
+        )  # fmt: skip
     if others:
         axes.plot([], [], color=PALETTE["grid"], linewidth=0.8, label="other candidates")
     axes.axhline(found.accuracy, color=PALETTE["muted"], linewidth=0.8, linestyle=(0, (1, 2)), zorder=1)
     what = "energy error" if found.measure == "energy" else "error of the orbit"
     axes.set(
-        xscale="log", yscale="log", xlabel="CPU time of a unit of time, ms",
+        xscale="log", yscale="log", xlabel="CPU time of the run, ms",
         ylabel=f"{what} up to t = {found.horizon:.4g}", title=_basis(found),
     )  # fmt: skip
-    axes.set_ylim(top=min(axes.get_ylim()[1], 3.0))
     axes.grid(True)
     axes.minorticks_off()
     axes.legend(loc="best")
 
 
-def _coordinates(curve: Curve) -> tuple[list[float], list[float]]:
-    return [1e-6 * p.cost for p in curve.points], [p.error for p in curve.points]
+def _coordinates(curve: Curve, horizon: float) -> tuple[list[float], list[float]]:
+    shown = [p for p in curve.points if p.error < _MOST]
+    return [1e-6 * p.cost * horizon for p in shown], [p.error for p in shown]
 
 
 def _basis(found: Tuning) -> str:

@@ -17,13 +17,12 @@ from multiprocessing.connection import Connection, wait
 from typing import Any
 
 from phigen.analysis.tuning.settings import Setting
-from phigen.api import interface_of
+from phigen.api import backend_of, chosen_target, interface_of
 from phigen.compiler import Compilation, compile_spec, emit
 from phigen.errors import PhigenError, SpecError
 from phigen.geometry.system import System
 from phigen.runtime import cache
-from phigen.runtime.c_solver import CSolver
-from phigen.runtime.interface import Interface
+from phigen.runtime.interface import Backend, Interface
 from phigen.spec.model import Spec
 from phigen.targets.header import split
 
@@ -35,7 +34,7 @@ _GRACE = 2.0
 
 @dataclass(frozen=True)
 class Built:
-    """A candidate, compiled: its C files, what it turned out to be, and the seconds that making it took.
+    """A candidate, compiled: its files, what it turned out to be, and the seconds that making it took.
 
     ``order`` may exceed that of the setting, since symmetric methods have even order. ``fingerprint`` is the same for
     two settings that mean the same code.
@@ -58,9 +57,9 @@ class Built:
         bodies = [split(text)[1] for _, text in sorted(self.files.items())]
         return hashlib.sha256("\0".join(bodies).encode()).hexdigest()
 
-    def solver(self) -> CSolver:
-        """The back end, from the cache."""
-        return CSolver.compile(self.files, self.interface)
+    def solver(self) -> Backend:
+        """The back end; the cache holds the library, if it is C."""
+        return backend_of(self.files, self.interface)
 
 
 @dataclass(frozen=True)
@@ -82,10 +81,11 @@ def build(spec: Spec, system: System, setting: Setting) -> Built:
 
 
 def built(compilation: Compilation, setting: Setting, start: float) -> Built:
-    """A compilation, compiled as C; ``start`` is when the work on it began."""
-    program = compilation.program
-    files = emit(program, "c", f"phigen build {program.name}.yaml")
-    cache.build(files)
+    """A compilation, compiled as C where there is a compiler; ``start`` is when the work on it began."""
+    program, target = compilation.program, chosen_target("auto")
+    files = emit(program, target, f"phigen build {program.name}.yaml")
+    if target == "c":
+        cache.build(files)
     stages = program.schedule.stages if program.schedule else len(program.fractions)
     return Built(
         setting, files, interface_of(program), compilation.label, program.order, compilation.exact,

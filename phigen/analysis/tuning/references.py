@@ -17,6 +17,8 @@ CONVERGED = 0.02
 #: The two may differ by this part of the accuracy.
 AGREED = 0.2
 _HALVINGS = 16
+#: Where an orbit is looked at but no accuracy is asked of it: an error below this says enough.
+KNOWN = 1e-12
 
 
 @dataclass
@@ -51,11 +53,11 @@ def agreed(first: Method, second: Method, step: float, span: float, accuracy: fl
     spacing = span / MARKS
     found = []
     for method in (first, second):
-        converged = _converged(method, min(step, spacing), spacing, accuracy, time.perf_counter() + seconds)
+        converged = _converged(method, min(step, spacing), spacing, MARKS, accuracy, time.perf_counter() + seconds)
         if converged is None:
             raise CheckError(f"no reference solution: a method fails before t = {span:.6g}")
         found.append(converged)
-    (states, h), (others, _) = found
+    (states, h, _), (others, _, _) = found
     difference = distance(states, others)
     if difference > AGREED * accuracy:
         size = float(np.max(np.abs(others))) or 1.0
@@ -69,28 +71,41 @@ def agreed(first: Method, second: Method, step: float, span: float, accuracy: fl
     return Reference(first, h, difference)
 
 
+def orbit_error(states: Floats, spacing: float, other: Method, step: float, seconds: float) -> float | None:
+    """How far states (rows, DIM) at multiples of a spacing are from those of another method at small steps.
+
+    Relative to the largest coordinate; None if the other method does not know the orbit that well in so many seconds.
+    """
+    count, until = len(states) - 1, time.perf_counter() + seconds
+    found = _converged(other, min(step, spacing), spacing, count, KNOWN, until)
+    if found is None:
+        return None
+    error = distance(states, found[0])
+    return error if found[2] < max(AGREED * error, KNOWN) else None
+
+
 def distance(states: Floats, others: Floats) -> float:
     """The largest difference of states (rows, DIM), relative to the largest coordinate."""
     return float(np.max(np.abs(states - others))) / (float(np.max(np.abs(others))) or 1.0)
 
 
 def _converged(
-    method: Method, step: float, spacing: float, accuracy: float, until: float
-) -> tuple[Floats, float] | None:
-    """States at a step where halving it changes nothing that counts, or no less than before."""
+    method: Method, step: float, spacing: float, count: int, accuracy: float, until: float
+) -> tuple[Floats, float, float] | None:
+    """States at a step where halving it changes nothing that counts, or no less than before; the step; that change."""
     last: Floats | None = None
-    best: tuple[Floats, float] | None = None
+    best: tuple[Floats, float, float] | None = None
     change = math.inf
     for k in range(_HALVINGS):
         stride = max(1, math.ceil(spacing / step * 2.0**k))
-        states = method.rows(spacing / stride, stride * MARKS, stride)
+        states = method.rows(spacing / stride, stride * count, stride)
         if states is None:
             continue
         if last is not None:
             before, change = change, distance(last, states)
             if change > before and best is not None:
                 break
-        best, last = (states, spacing / stride), states
+        best, last = (states, spacing / stride, change), states
         if change <= CONVERGED * accuracy or time.perf_counter() > until:
             break
     return best

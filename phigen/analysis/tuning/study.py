@@ -10,7 +10,7 @@ from statistics import median
 from phigen.analysis.tuning import search
 from phigen.analysis.tuning.search import Curve
 from phigen.analysis.tuning.settings import Setting
-from phigen.analysis.tuning.trials import TIMED_STEPS, Point, Problem, nanoseconds_per_step, steps_in
+from phigen.analysis.tuning.trials import Point, Problem, nanoseconds_per_step, steps_in
 from phigen.analysis.tuning.tuner import Clock, Notify, Tuner
 from phigen.compiler import Compilation
 
@@ -19,7 +19,7 @@ CONFIRMING, PATIENCE, ATTEMPTS = 0.05, 4.0, 4
 #: Finalists, how far behind the best they may be, and the rounds in which all are timed in turn.
 FINALISTS, BEHIND, ROUNDS = 4, 2.0, 7
 #: Costs this close are equal: then the lower order wins.
-EQUAL = 1.05
+EQUAL = 1.1
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class Tuning:
     ``own`` is the spec's own setting at the accuracy, None if it does not reach it; ``present`` that at the run's
     step; ``peers`` are classical methods at the accuracy, those that reach it. Scans were made over ``piece`` of the
     ``horizon``. ``refused`` tells why other candidates were not measured; ``finished`` whether no more seemed worth
-    trying.
+    trying; ``orbit_error`` that of the best over the piece where the energy was measured, None if that is unknown.
     """
 
     measure: str
@@ -60,7 +60,7 @@ class Tuning:
     peers: tuple[Finalist, ...] = ()
     refused: Mapping[Setting, str] = field(default_factory=dict)
     finished: bool = True
-    most: float = math.inf
+    orbit_error: float | None = None
 
     @property
     def winner(self) -> Finalist | None:
@@ -94,10 +94,12 @@ def tune(
     peers = [Finalist(c, p) for c in classical if (p := confirmed(tuner, c))]
     timed = time_all([*finalists, *peers, *([present] if present else [])], tuner)
     ranked, peers = ranking(timed[: len(finalists)]), timed[len(finalists) :][: len(peers)]
+    look = ranked and measure == "energy"
     return Tuning(
         measure, accuracy, problem.horizon, tuner.piece, (*tuner.tried.values(), *classical), tuple(ranked),
         next((f for f in ranked if f.curve is own), None), timed[-1] if present else None, tuple(peers),
-        {s: why for s, why in tuner.refused.items() if why}, finished, tuner.most,
+        {s: why for s, why in tuner.refused.items() if why}, finished,
+        tuner.orbit_error(ranked[0].curve, ranked[0].point.step) if look else None,
     )  # fmt: skip
 
 
@@ -173,6 +175,6 @@ def time_all(finalists: Sequence[Finalist], tuner: Tuner) -> list[Finalist]:
     for _ in range(ROUNDS):
         for finalist, listed in zip(finalists, seconds, strict=True):
             h = finalist.point.step
-            steps = min(steps_in(tuner.piece, h), TIMED_STEPS)
+            steps = steps_in(tuner.problem.horizon, h)
             listed.append(1e-9 * nanoseconds_per_step(tuner.methods[finalist.curve.key], h, steps) / h)
     return [replace(f, seconds=tuple(listed)) for f, listed in zip(finalists, seconds, strict=True)]

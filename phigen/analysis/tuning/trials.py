@@ -14,8 +14,7 @@ from phigen.analysis.arrays import Floats, evaluate
 from phigen.analysis.race import Runner
 from phigen.analysis.summary import errors_of
 from phigen.geometry.system import System
-from phigen.runtime.c_solver import CSolver
-from phigen.runtime.interface import BackendError, row_steps
+from phigen.runtime.interface import Backend, BackendError, row_steps
 from phigen.runtime.session import rows_along
 
 #: States at which the energy of one run is looked at, at most; and times at which an orbit is compared.
@@ -23,11 +22,12 @@ ROWS, MARKS = 8_000, 256
 #: One rounding moves the energy by about this much, relatively; over n steps they add up like a random walk.
 ROUNDING = 1.1e-16
 #: A measurement of time lasts at least so many seconds.
-LEAST_SECONDS = 4e-3
-#: Steps that are timed, at most.
-TIMED_STEPS = 10_000
-#: Errors that grow faster than this power of time are those of chaotic motion.
-LINEAR = 1.8
+LEAST_SECONDS = 2e-3
+#: Steps that are timed: first so few, then in parts that double from at most so many, and in all.
+FEW_STEPS, PART_STEPS, TIMED_STEPS = 64, 4096, 32_768
+#: Errors that grow faster than this power of time are those of chaotic motion; and slower than that they are linear,
+#: but for oscillations.
+LINEAR, STEADY = 1.8, 1.3
 
 
 @dataclass(frozen=True)
@@ -58,8 +58,8 @@ class Method(Protocol):
         """States (rows, DIM) after 0, stride, 2·stride, … and all steps; None if one cannot be made."""
         ...
 
-    def there_and_back(self, h: float, steps: int, times: int) -> Callable[[], None]:
-        """A function to be timed: it makes so many steps and as many back, so many times over."""
+    def walk(self, h: float) -> Callable[[int], object]:
+        """A function to be timed: from the start, it makes so many steps, and with each call so many more."""
         ...
 
 
@@ -67,7 +67,7 @@ class Method(Protocol):
 class Candidate:
     """A solver of phigen's as a method."""
 
-    solver: CSolver
+    solver: Backend
     problem: Problem
 
     def rows(self, h: float, steps: int, stride: int) -> Floats | None:
@@ -88,14 +88,9 @@ class Candidate:
             return error.step * h, error.status
         return steps * h, "OK"
 
-    def there_and_back(self, h: float, steps: int, times: int) -> Callable[[], None]:
+    def walk(self, h: float) -> Callable[[int], object]:
         session = self.solver.start(self.problem.start, self.problem.parameters)
-
-        def work() -> None:
-            for size in (self.problem.direction * h, -self.problem.direction * h) * times:
-                session.advance(size, steps)
-
-        return work
+        return lambda steps: session.advance(self.problem.direction * h, steps)
 
 
 @dataclass(frozen=True)
@@ -118,13 +113,10 @@ class Classical:
             states[row] = found
         return states
 
-    def there_and_back(self, h: float, steps: int, times: int) -> Callable[[], None]:
+    def walk(self, h: float) -> Callable[[int], object]:
+        # Its steps take the same time everywhere: all calls start where the problem does.
         self.state[:] = self.problem.start
-
-        def work() -> None:
-            self.runner(self.problem.direction * h, steps, 2 * times)
-
-        return work
+        return lambda steps: self.runner(self.problem.direction * h, steps, 1)
 
 
 @dataclass(frozen=True)
@@ -161,25 +153,51 @@ def steps_in(span: float, h: float) -> int:
     return max(1, round(span / h))
 
 
-def nanoseconds_per_step(method: Method, h: float, steps: int, least: float = LEAST_SECONDS) -> float:
-    """CPU time of one step on this thread, without that of the calls; NaN if the steps cannot be made both ways.
+def marks(span: float, h: float) -> tuple[int, int]:
+    """A stride in steps, and how many of it fill a span with about `MARKS`: not more, since the solution may end."""
+    stride = max(1, round(span / h / MARKS))
+    return stride, max(1, int(span / h / stride + 1e-9))
 
-    The steps are made forth and back: so there may be few of them, and the start, where a solver chooses its gauge,
-    is not in the time.
+
+def nanoseconds_per_step(method: Method, h: float, steps: int) -> float:
+    """CPU time on this thread of one of the steps of a run, the fastest of some; NaN if they cannot be made.
+
+    Without what is done once, such as choosing a gauge, and without the call from Python.
     """
-
-    def seconds(n: int, times: int) -> float:
-        work = method.there_and_back(h, n, times)
-        start = time.thread_time()
-        work()
-        return (time.thread_time() - start) / (2 * times)
-
+    fastest = call = math.inf
+    spent = 0.0
     try:
-        once = max(seconds(steps, 1), 1e-8)
-        times = max(1, math.ceil(least / (2 * once)))
-        return 1e9 * max(seconds(steps, times) - seconds(0, times), 0.1 * once) / steps
+        while spent < LEAST_SECONDS:
+            walk = method.walk(h)
+            walk(1)
+            call = min(call, _seconds(walk, 1))
+            taken, expected = _run_seconds(method.walk(h), steps)
+            fastest, spent = min(fastest, expected), spent + taken
     except BackendError:
         return math.nan
+    return 1e9 * max(fastest - call, 0.1 * fastest) / max(steps - 1, 1)
+
+
+def _run_seconds(walk: Callable[[int], object], steps: int) -> tuple[float, float]:
+    """The seconds that were taken, and those that all steps of a run would take.
+
+    Of a long run only so many are made that the rest should be as fast as the last of them: a solver in C first learns
+    the motion, then foresees it, and goes on in blocks of steps, several times as fast.
+    """
+    taken, done, part = 0.0, 0, min(FEW_STEPS, steps)
+    while True:
+        last = _seconds(walk, part)
+        taken, done = taken + last, done + part
+        if done >= min(steps, TIMED_STEPS) or last >= LEAST_SECONDS:
+            return taken, taken + last * (steps - done) / part
+        lasting = int(part * LEAST_SECONDS / last)
+        part = min(max(done, min(lasting, PART_STEPS)), steps - done)
+
+
+def _seconds(walk: Callable[[int], object], steps: int) -> float:
+    start = time.thread_time()
+    walk(steps)
+    return max(time.thread_time() - start, 1e-8)
 
 
 def energy_measure(problem: Problem, *, bounded: bool = True) -> Measure:
@@ -207,22 +225,21 @@ def energy_measure(problem: Problem, *, bounded: bool = True) -> Measure:
         rounding = ROUNDING * math.sqrt(steps * ratio)
         more = rounding - ROUNDING * math.sqrt(steps)
         error = largest + more if bounded else largest * math.pow(ratio, growth if growth > 0.3 else 0.0) + more
-        cost = nanoseconds_per_step(method, h, min(steps, TIMED_STEPS))
+        cost = nanoseconds_per_step(method, h, steps_in(problem.horizon, h))
         return Point(h, error, largest, made, cost, growth, rounding) if math.isfinite(cost) else None
 
     return measure
 
 
 def orbit_measure(problem: Problem, reference: Solution, *, bounded: bool = True) -> Measure:
-    """The largest distance from a reference at some `MARKS` times, relative to the largest coordinate there is.
+    """The largest distance from a reference at about `MARKS` times, relative to the largest coordinate there is.
 
     Up to the horizon the error of phigen's methods is taken to grow linearly in time, since that of their energy is
-    ``bounded``; that of others as fast as it was seen to, up to quadratically.
+    ``bounded``, unless it was seen to grow faster, as rounding does; that of others at least linearly.
     """
 
     def measure(method: Method, h: float, span: float) -> Point | None:
-        stride = max(1, round(span / h / MARKS))
-        count = min(MARKS, max(1, round(span / h)))
+        stride, count = marks(span, h)
         states = method.rows(h, stride * count, stride)
         if states is None:
             return None
@@ -231,9 +248,9 @@ def orbit_measure(problem: Problem, reference: Solution, *, bounded: bool = True
         errors = np.max(np.abs(states - expected), axis=1) / size
         largest = max(float(np.max(errors)), ROUNDING)
         growth, made = _growth(errors), stride * count * h
-        power = 1.0 if bounded or math.isnan(growth) else min(max(growth, 1.0), 2.0)
+        power = 1.0 if math.isnan(growth) or (bounded and growth < STEADY) else min(max(growth, 1.0), 2.0)
         error = largest * math.pow(max(problem.horizon / made, 1.0), power)
-        cost = nanoseconds_per_step(method, h, min(stride * count, TIMED_STEPS))
+        cost = nanoseconds_per_step(method, h, steps_in(problem.horizon, h))
         return Point(h, error, largest, made, cost, growth) if math.isfinite(cost) else None
 
     return measure

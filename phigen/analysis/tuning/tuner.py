@@ -13,7 +13,7 @@ from phigen.analysis import race
 from phigen.analysis.arrays import Floats
 from phigen.analysis.tuning import search
 from phigen.analysis.tuning.building import Built, Outcome, Refusal, build_all, built
-from phigen.analysis.tuning.references import Reference, agreed
+from phigen.analysis.tuning.references import Reference, agreed, orbit_error
 from phigen.analysis.tuning.search import Curve
 from phigen.analysis.tuning.settings import Setting, charts, direct, own_setting
 from phigen.analysis.tuning.trials import (
@@ -25,10 +25,12 @@ from phigen.analysis.tuning.trials import (
     Point,
     Problem,
     energy_measure,
+    marks,
     nanoseconds_per_step,
     orbit_measure,
     steps_in,
 )
+from phigen.api import chosen_target, solver_of
 from phigen.compiler import Compilation
 from phigen.errors import CheckError, StepError
 
@@ -42,8 +44,8 @@ PIECE_STEPS, PIECE_SECONDS = 20_000, 0.02
 MOST_TURN, LEAST_STEPS = 2.0, 24
 #: What the accuracy may cost a candidate relative to the best so far, and a classical method.
 WORTH, WORTH_KNOWING = 4.0, 100.0
-#: Classical methods beside which the result is shown, with their names in tables.
-PEERS = {"rk4": ("RK4 in C", 4), "dop853": ("DOP853 in C", 8)}
+#: Classical methods beside which the result is shown: their names in tables, and orders.
+PEERS = {"rk4": ("RK4", 4), "dop853": ("DOP853", 8)}
 
 Notify = Callable[[str], object]
 
@@ -67,7 +69,7 @@ class Tuner:
     """The state of a search. ``measures`` maps True to the measure of phigen's methods, False to that of others.
 
     ``piece`` is the time over which candidates are scanned, ``most`` the largest step that is of use, ``referring``
-    whether orbits are compared with a reference.
+    whether orbits are compared with a reference; ``target`` is C where there is a compiler.
     """
 
     def __init__(
@@ -80,6 +82,7 @@ class Tuner:
     ) -> None:
         self.compilation, self.problem, self.accuracy = compilation, problem, accuracy
         self.clock, self.note = clock, note
+        self.target = chosen_target("auto")
         self.tried: dict[Setting, Curve] = {}
         self.refused: dict[Setting, str] = {}
         self.methods: dict[Setting | str, Method] = {}
@@ -135,6 +138,7 @@ class Tuner:
             return []
         found = []
         for name, (label, order) in PEERS.items():
+            label = f"{label} in {'C' if self.target == 'c' else 'Python'}"
             self.methods[label] = self._classical(name)
             points = self._scanned(self.methods[label], order, WORTH_KNOWING * self.least, own=False)
             found.append(Curve(label, order, points))
@@ -145,6 +149,7 @@ class Tuner:
         outcomes: dict[Setting, Outcome] = {s: self._made[s] for s in settings if s in self._made}
         until = min(self.clock.at(SEARCHING), time.perf_counter() + BUILDING * self.clock.budget)
         wanted = self._affordable([s for s in settings if s not in self._made])
+        self.note(f"building {len(wanted)} more")
         outcomes |= build_all(self.compilation.spec, self.compilation.system, wanted, until)
         for setting in (s for s in settings if s in outcomes):
             outcome = outcomes[setting]
@@ -157,13 +162,22 @@ class Tuner:
             else:
                 curve = self.add(outcome, Candidate(outcome.solver(), self.problem), WORTH * self.least)
                 cost = curve.cost(self.accuracy)
-                told = f"{cost * 1e-3:.3g} µs per unit of time" if math.isfinite(cost) else "not reached"
+                told = f"{1e-6 * cost * self.problem.horizon:.3g} ms" if math.isfinite(cost) else "not reached"
                 self.note(f"{curve.title}: {told}")
 
     @property
     def least(self) -> float:
         """The least cost so far, in nanoseconds per unit of time."""
         return min((c.cost(self.accuracy) for c in self.tried.values()), default=math.inf)
+
+    def orbit_error(self, curve: Curve, h: float) -> float | None:
+        """The error of the orbit over the time of a scan, by DOP853; None if that is unknown."""
+        stride, count = marks(self.piece, h)
+        states = self.methods[curve.key].rows(h, stride * count, stride)
+        if states is None or self._race is None:
+            return None
+        seconds = REFERRING * self.clock.budget
+        return orbit_error(states, stride * h, self._classical("dop853"), self.problem.step, seconds)
 
     def _affordable(self, settings: Sequence[Setting]) -> list[Setting]:
         """Without those that would not be built in time, as orders below let expect."""
@@ -186,8 +200,12 @@ class Tuner:
 
     def _classical(self, name: str) -> Classical:
         if self._race is None:
-            problem = self.problem
-            self._race = race.compiled(self.compilation, list(PEERS), self._state, problem.parameters)
+            parameters = self.problem.parameters
+            if self.target == "c":
+                self._race = race.compiled(self.compilation, list(PEERS), self._state, parameters)
+            else:
+                solver = solver_of(self.compilation, self.target)
+                self._race = race.interpreted(solver, list(PEERS), self._state, parameters)
         return Classical(self._race.runners[name], self._state, self.problem)
 
     def _refer(self, setting: Setting, method: Candidate) -> None:
