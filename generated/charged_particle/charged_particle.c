@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: d84e1085b789ac6c08eca4eeef2f82ba46060c9b377116f61b385aae1a0e69f1
+ * body-sha256: ab459b3c29aced32d70f003cbb4c8ffb0d379c32efa3b19d70828473bbf1672d
  */
 #include "charged_particle.h"
 
@@ -523,17 +523,24 @@ charged_particle_status charged_particle_init(charged_particle_solver *s,
     return charged_particle_OK;
 }
 
-charged_particle_status charged_particle_step(charged_particle_solver *s, double h)
+/* What depends on the step size; nothing where that is as before. */
+static charged_particle_status charged_particle_set_step(charged_particle_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return charged_particle_BAD_ARGUMENT;
-    if (!s->ready || memcmp(&h, &s->h, sizeof h) != 0) {
-        for (int stage = 0; stage < 1; ++stage)
-            charged_particle_prepare(&s->params, charged_particle_fractions[stage] * h, s->coef[stage]);
-        memset(s->memory, 0, sizeof s->memory);
-        s->h = h;
-        s->ready = 1;
-    }
-    const charged_particle_status status = charged_particle_stages(s);
+    if (s->ready && memcmp(&h, &s->h, sizeof h) == 0) return charged_particle_OK;
+    for (int stage = 0; stage < 1; ++stage)
+        charged_particle_prepare(&s->params, charged_particle_fractions[stage] * h, s->coef[stage]);
+    memset(s->memory, 0, sizeof s->memory);
+    s->h = h;
+    s->ready = 1;
+    return charged_particle_OK;
+}
+
+charged_particle_status charged_particle_step(charged_particle_solver *s, double h)
+{
+    charged_particle_status status = charged_particle_set_step(s, h);
+    if (status != charged_particle_OK) return status;
+    status = charged_particle_stages(s);
     if (status == charged_particle_OK) ++s->steps;
     return status;
 }

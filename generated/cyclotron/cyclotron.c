@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: d60cd5875a8c5b7bfc6e9c9876f246355494d25a4884721269fdf736848a7e1d
+ * body-sha256: 81e6bd6e28b3564a9a70275c0ef30c3d46113039306cc096159a714f7e4d30f0
  */
 #include "cyclotron.h"
 
@@ -357,17 +357,28 @@ cyclotron_status cyclotron_init(cyclotron_solver *s, const cyclotron_params *par
     return cyclotron_OK;
 }
 
-cyclotron_status cyclotron_step(cyclotron_solver *s, double h)
+/* What depends on the step size; nothing where that is as before. */
+static cyclotron_status cyclotron_set_step(cyclotron_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return cyclotron_BAD_ARGUMENT;
-    if (!s->ready || memcmp(&h, &s->h, sizeof h) != 0) {
-        for (int stage = 0; stage < 1; ++stage)
-            cyclotron_prepare(&s->params, cyclotron_fractions[stage] * h, s->coef[stage]);
-        memset(s->memory, 0, sizeof s->memory);
-        s->h = h;
-        s->ready = 1;
-    }
-    const cyclotron_status status = cyclotron_stages(s);
+    if (s->ready && memcmp(&h, &s->h, sizeof h) == 0) return cyclotron_OK;
+    for (int stage = 0; stage < 1; ++stage)
+        cyclotron_prepare(&s->params, cyclotron_fractions[stage] * h, s->coef[stage]);
+    memset(s->memory, 0, sizeof s->memory);
+    s->pause = 16;
+    s->setback = s->foreseeing = 0;
+    s->doubt = s->retry = 0;
+    s->effort = 0.0;
+    s->h = h;
+    s->ready = 1;
+    return cyclotron_OK;
+}
+
+cyclotron_status cyclotron_step(cyclotron_solver *s, double h)
+{
+    cyclotron_status status = cyclotron_set_step(s, h);
+    if (status != cyclotron_OK) return status;
+    status = cyclotron_stages(s);
     if (status == cyclotron_OK) ++s->steps;
     return status;
 }
@@ -574,7 +585,7 @@ static void cyclotron_tell(const cyclotron_solver *s, cyclotron_table *table)
     }
 }
 
-/* The guesses for the next cyclotron_LANES values. */
+/* Guesses for the next cyclotron_LANES values of a stage, by its recurrences. */
 static void cyclotron_foresee(const cyclotron_memory *memory, cyclotron_lanes weight[restrict][3],
     cyclotron_lanes y[restrict 3])
 {
@@ -614,14 +625,39 @@ static double cyclotron_correct(cyclotron_lines *line)
     return isfinite(total) ? largest : HUGE_VAL;
 }
 
+/* Guesses where no recurrence is known: midpoints of steps by the classical Runge-Kutta method. */
+static void cyclotron_march(const cyclotron_solver *s, cyclotron_lines line[1])
+{
+    static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
+    double x[3], point[3], slope[3], mean[3];
+    memcpy(x, s->x, sizeof x);
+    for (int k = 0; k < 1 * cyclotron_LANES; ++k) {
+        const double h = cyclotron_fractions[k % 1] * s->h;
+        memcpy(point, x, sizeof x);
+        memset(mean, 0, sizeof mean);
+        for (int part = 0; part < 4; ++part) {
+            cyclotron_vector_field(&s->params, point, slope);
+            for (int i = 0; i < 3; ++i) {
+                mean[i] += weight[part] * slope[i];
+                point[i] = x[i] + h * reach[part] * slope[i];
+            }
+        }
+        for (int i = 0; i < 3; ++i) {
+            line[k % 1].y[i][k / 1] = x[i] + 0.5 * h * mean[i];
+            x[i] += h * mean[i];
+        }
+    }
+}
+
 /* cyclotron_LANES steps at once: guess the points of all, and correct them together until the error that remains is as
-   small as after a single step. 0, and the solver as before, where that does not come about. */
-static int cyclotron_block(cyclotron_solver *s, cyclotron_table *table)
+   small as after a single step. How many passes that took; 0, and the solver as before, where it takes more than most. */
+static int cyclotron_block(cyclotron_solver *s, cyclotron_table *table, int most)
 {
     cyclotron_lines line[1];
     double x[3], carry[3], value[3], previous = HUGE_VAL;
     int passes = 0, solved = 0;
-    for (int stage = 0; stage < 1; ++stage)
+    if (!s->foreseeing) cyclotron_march(s, line);
+    for (int stage = 0; stage < 1 && s->foreseeing; ++stage)
         cyclotron_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
     while (!solved) {
         double size = 0.0;
@@ -634,12 +670,11 @@ static int cyclotron_block(cyclotron_solver *s, cyclotron_table *table)
         const double growth = size / (previous * previous);
         /* The second test: after the square of so small a correction there is rounding only. */
         solved = size * size * (growth > 1.0 ? growth : 1.0) <= 1e-20 || (previous < 1e-8 && size < 1e-10);
-        if (++passes == 4 || !(size < previous)) break;
+        if ((++passes >= most || !(size < previous)) && !solved) return 0;
         previous = size;
     }
     for (int i = 0; i < 3; ++i)
         if (!isfinite(x[i])) return 0;
-    if (!solved) return 0;
     memcpy(s->x, x, sizeof x);
     memcpy(s->carry, carry, sizeof carry);
     s->steps += cyclotron_LANES;
@@ -650,52 +685,72 @@ static int cyclotron_block(cyclotron_solver *s, cyclotron_table *table)
             cyclotron_record(memory, value);
         }
         memory->slow = passes > 1 ? memory->slow + cyclotron_LANES : 0;
-        if (memory->slow > memory->patience) cyclotron_fit(memory);
+        if (memory->slow > memory->patience && s->foreseeing) cyclotron_fit(memory);
     }
-    return 1;
+    return passes;
 }
 
-/* Whether a block may be tried: not before there are recurrences to guess with, and not for a while after one that
-   failed. They take a thousand steps to repay. */
-static int cyclotron_may_block(cyclotron_solver *s, double h, size_t steps)
+/* How the next block is guessed: by recurrences once they are fitted, which takes a thousand steps to repay. */
+static void cyclotron_choose_guess(cyclotron_solver *s, size_t steps)
 {
-    int fit = s->setback > 0 && s->steps - s->fitted >= 1000;
-    if (!s->ready || memcmp(&h, &s->h, sizeof h) != 0 || steps < cyclotron_LANES) return 0;
-    if (s->pause > 0) {
-        --s->pause;
-        return 0;
-    }
-    for (int stage = 0; stage < 1; ++stage) {
-        fit = fit || s->memory[stage].fits == 0;
-        if (s->memory[stage].count < 96) return 0;
-    }
-    if (fit && steps < 1000) return 0;
-    for (int stage = 0; stage < 1 && fit; ++stage) cyclotron_fit(&s->memory[stage]);
-    if (fit) s->fitted = s->steps;
-    return 1;
+    for (int stage = 0; stage < 1; ++stage)
+        if (s->memory[stage].count < 96) {
+            s->foreseeing = 0;
+            return;
+        }
+    if (s->foreseeing || steps < 1000 || s->steps < s->retry) return;
+    for (int stage = 0; stage < 1; ++stage) cyclotron_fit(&s->memory[stage]);
+    s->foreseeing = 1;
+    s->pause = cyclotron_LANES;
 }
 
-/* Blocks of steps where the motion can be foreseen, single steps elsewhere: the results differ by round-off only. */
+/* Learn from a block: recurrences that guess no better than steps by Runge-Kutta are given up for a while, and so are
+   blocks that fail with those. */
+static void cyclotron_learn_from(cyclotron_solver *s, int passes)
+{
+    if (s->foreseeing && (passes == 0 || (passes > 1 && passes >= s->passes))) {
+        s->foreseeing = 0;
+        s->doubt = 2 * s->doubt + 2000;
+        s->retry = s->steps + s->doubt;
+    } else if (passes == 0) {
+        s->setback = 2 * s->setback + cyclotron_LANES > 1000 ? 1000 : 2 * s->setback + cyclotron_LANES;
+        s->pause = s->setback;
+    } else {
+        s->setback /= 2;
+        if (!s->foreseeing) s->passes = passes;
+    }
+}
+
+/* A single step, and the running mean of the evaluations that a stage of one takes. */
+static cyclotron_status cyclotron_single(cyclotron_solver *s)
+{
+    const size_t before = s->evaluations;
+    const cyclotron_status status = cyclotron_step(s, s->h);
+    s->effort += 0.125 * ((double)(s->evaluations - before) / 1 - s->effort);
+    return status;
+}
+
+/* Blocks of steps where they cost less than single steps, with at most as many passes over a block as 2 for each
+   evaluation in a single step. The results differ by round-off only. */
 cyclotron_status cyclotron_integrate(cyclotron_solver *s, double h, size_t steps)
 {
     cyclotron_table table;
+    cyclotron_status status = cyclotron_set_step(s, h);
     for (int stage = 0; stage < 1; ++stage) table.fits[stage] = -1;
-    while (steps > 0) {
-        if (s != NULL && cyclotron_may_block(s, h, steps)) {
+    while (status == cyclotron_OK && steps > 0) {
+        if (steps >= cyclotron_LANES && s->pause == 0) cyclotron_choose_guess(s, steps);
+        if (steps >= cyclotron_LANES && s->pause == 0) {
             cyclotron_tell(s, &table);
-            if (cyclotron_block(s, &table)) {
-                steps -= cyclotron_LANES;
-                s->setback /= 2;
-                continue;
-            }
-            s->setback = 2 * s->setback + cyclotron_LANES > 1000 ? 1000 : 2 * s->setback + cyclotron_LANES;
-            s->pause = s->setback;
+            const int passes = cyclotron_block(s, &table, (int)(2 * s->effort + 0.5));
+            cyclotron_learn_from(s, passes);
+            if (passes > 0) steps -= cyclotron_LANES;
+        } else {
+            if (s->pause > 0) --s->pause;
+            status = cyclotron_single(s);
+            if (status == cyclotron_OK) --steps;
         }
-        const cyclotron_status status = cyclotron_step(s, h);
-        if (status != cyclotron_OK) return status;
-        --steps;
     }
-    return cyclotron_OK;
+    return status;
 }
 
 cyclotron_status cyclotron_ensemble(const cyclotron_params *params, double *x, size_t members, double h,

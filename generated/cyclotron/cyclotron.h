@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 4feed4fffcaa245f7e02e74dc3dfc3d14816020c1b79fef821882a51de2fb7de
+ * body-sha256: 29178d59b544e614160f01426bde2c1feeaac6ec1b59d7e9d7bbbb3bcfdae50d
  */
 #ifndef CYCLOTRON_H
 #define CYCLOTRON_H
@@ -67,9 +67,13 @@ typedef struct {
     cyclotron_params params;
     double h;  /* the step size that coef belongs to */
     int ready; /* whether coef has been computed */
-    int pause;   /* steps to make singly before a block is tried */
-    int setback; /* the last pause, halved with every block that succeeds */
-    size_t fitted; /* steps when recurrences were last fitted for blocks */
+    double effort;  /* evaluations that a single step takes, for each stage */
+    int pause;      /* steps to make singly before a block is tried */
+    int setback;    /* the last pause, halved with every block that succeeds */
+    int foreseeing; /* whether blocks are guessed by recurrences */
+    int passes;     /* that the last block took which was not */
+    size_t doubt;   /* steps to wait before recurrences are tried again */
+    size_t retry;   /* steps after which that is */
     double coef[1][3]; /* what depends on params and h only, for each stage */
     cyclotron_memory memory[1];
 } cyclotron_solver;

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 21886937c4ad3b58a1f060d101b8a67b8c75440a0a0d38ae51025751f8f56664
+ * body-sha256: 71bc799bf2d59664a530101ec4678b9fb5f03d530f841122e7d998abc9e45713
  */
 #include "engel_geodesics.h"
 
@@ -398,17 +398,28 @@ engel_geodesics_status engel_geodesics_init(engel_geodesics_solver *s, const eng
     return engel_geodesics_OK;
 }
 
-engel_geodesics_status engel_geodesics_step(engel_geodesics_solver *s, double h)
+/* What depends on the step size; nothing where that is as before. */
+static engel_geodesics_status engel_geodesics_set_step(engel_geodesics_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return engel_geodesics_BAD_ARGUMENT;
-    if (!s->ready || memcmp(&h, &s->h, sizeof h) != 0) {
-        for (int stage = 0; stage < 1; ++stage)
-            engel_geodesics_prepare(&s->params, engel_geodesics_fractions[stage] * h, s->coef[stage]);
-        memset(s->memory, 0, sizeof s->memory);
-        s->h = h;
-        s->ready = 1;
-    }
-    const engel_geodesics_status status = engel_geodesics_stages(s);
+    if (s->ready && memcmp(&h, &s->h, sizeof h) == 0) return engel_geodesics_OK;
+    for (int stage = 0; stage < 1; ++stage)
+        engel_geodesics_prepare(&s->params, engel_geodesics_fractions[stage] * h, s->coef[stage]);
+    memset(s->memory, 0, sizeof s->memory);
+    s->pause = 16;
+    s->setback = s->foreseeing = 0;
+    s->doubt = s->retry = 0;
+    s->effort = 0.0;
+    s->h = h;
+    s->ready = 1;
+    return engel_geodesics_OK;
+}
+
+engel_geodesics_status engel_geodesics_step(engel_geodesics_solver *s, double h)
+{
+    engel_geodesics_status status = engel_geodesics_set_step(s, h);
+    if (status != engel_geodesics_OK) return status;
+    status = engel_geodesics_stages(s);
     if (status == engel_geodesics_OK) ++s->steps;
     return status;
 }
@@ -680,7 +691,7 @@ static void engel_geodesics_tell(const engel_geodesics_solver *s, engel_geodesic
     }
 }
 
-/* The guesses for the next engel_geodesics_LANES values. */
+/* Guesses for the next engel_geodesics_LANES values of a stage, by its recurrences. */
 static void engel_geodesics_foresee(const engel_geodesics_memory *memory, engel_geodesics_lanes weight[restrict][4],
     engel_geodesics_lanes y[restrict 4])
 {
@@ -720,14 +731,39 @@ static double engel_geodesics_correct(engel_geodesics_lines *line)
     return isfinite(total) ? largest : HUGE_VAL;
 }
 
+/* Guesses where no recurrence is known: midpoints of steps by the classical Runge-Kutta method. */
+static void engel_geodesics_march(const engel_geodesics_solver *s, engel_geodesics_lines line[1])
+{
+    static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
+    double x[4], point[4], slope[4], mean[4];
+    memcpy(x, s->x, sizeof x);
+    for (int k = 0; k < 1 * engel_geodesics_LANES; ++k) {
+        const double h = engel_geodesics_fractions[k % 1] * s->h;
+        memcpy(point, x, sizeof x);
+        memset(mean, 0, sizeof mean);
+        for (int part = 0; part < 4; ++part) {
+            engel_geodesics_vector_field(&s->params, point, slope);
+            for (int i = 0; i < 4; ++i) {
+                mean[i] += weight[part] * slope[i];
+                point[i] = x[i] + h * reach[part] * slope[i];
+            }
+        }
+        for (int i = 0; i < 4; ++i) {
+            line[k % 1].y[i][k / 1] = x[i] + 0.5 * h * mean[i];
+            x[i] += h * mean[i];
+        }
+    }
+}
+
 /* engel_geodesics_LANES steps at once: guess the points of all, and correct them together until the error that remains is as
-   small as after a single step. 0, and the solver as before, where that does not come about. */
-static int engel_geodesics_block(engel_geodesics_solver *s, engel_geodesics_table *table)
+   small as after a single step. How many passes that took; 0, and the solver as before, where it takes more than most. */
+static int engel_geodesics_block(engel_geodesics_solver *s, engel_geodesics_table *table, int most)
 {
     engel_geodesics_lines line[1];
     double x[4], carry[4], value[4], previous = HUGE_VAL;
     int passes = 0, solved = 0;
-    for (int stage = 0; stage < 1; ++stage)
+    if (!s->foreseeing) engel_geodesics_march(s, line);
+    for (int stage = 0; stage < 1 && s->foreseeing; ++stage)
         engel_geodesics_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
     while (!solved) {
         double size = 0.0;
@@ -740,12 +776,11 @@ static int engel_geodesics_block(engel_geodesics_solver *s, engel_geodesics_tabl
         const double growth = size / (previous * previous);
         /* The second test: after the square of so small a correction there is rounding only. */
         solved = size * size * (growth > 1.0 ? growth : 1.0) <= 1e-20 || (previous < 1e-8 && size < 1e-10);
-        if (++passes == 4 || !(size < previous)) break;
+        if ((++passes >= most || !(size < previous)) && !solved) return 0;
         previous = size;
     }
     for (int i = 0; i < 4; ++i)
         if (!isfinite(x[i])) return 0;
-    if (!solved) return 0;
     memcpy(s->x, x, sizeof x);
     memcpy(s->carry, carry, sizeof carry);
     s->steps += engel_geodesics_LANES;
@@ -756,52 +791,72 @@ static int engel_geodesics_block(engel_geodesics_solver *s, engel_geodesics_tabl
             engel_geodesics_record(memory, value);
         }
         memory->slow = passes > 1 ? memory->slow + engel_geodesics_LANES : 0;
-        if (memory->slow > memory->patience) engel_geodesics_fit(memory);
+        if (memory->slow > memory->patience && s->foreseeing) engel_geodesics_fit(memory);
     }
-    return 1;
+    return passes;
 }
 
-/* Whether a block may be tried: not before there are recurrences to guess with, and not for a while after one that
-   failed. They take a thousand steps to repay. */
-static int engel_geodesics_may_block(engel_geodesics_solver *s, double h, size_t steps)
+/* How the next block is guessed: by recurrences once they are fitted, which takes a thousand steps to repay. */
+static void engel_geodesics_choose_guess(engel_geodesics_solver *s, size_t steps)
 {
-    int fit = s->setback > 0 && s->steps - s->fitted >= 1000;
-    if (!s->ready || memcmp(&h, &s->h, sizeof h) != 0 || steps < engel_geodesics_LANES) return 0;
-    if (s->pause > 0) {
-        --s->pause;
-        return 0;
-    }
-    for (int stage = 0; stage < 1; ++stage) {
-        fit = fit || s->memory[stage].fits == 0;
-        if (s->memory[stage].count < 96) return 0;
-    }
-    if (fit && steps < 1000) return 0;
-    for (int stage = 0; stage < 1 && fit; ++stage) engel_geodesics_fit(&s->memory[stage]);
-    if (fit) s->fitted = s->steps;
-    return 1;
+    for (int stage = 0; stage < 1; ++stage)
+        if (s->memory[stage].count < 96) {
+            s->foreseeing = 0;
+            return;
+        }
+    if (s->foreseeing || steps < 1000 || s->steps < s->retry) return;
+    for (int stage = 0; stage < 1; ++stage) engel_geodesics_fit(&s->memory[stage]);
+    s->foreseeing = 1;
+    s->pause = engel_geodesics_LANES;
 }
 
-/* Blocks of steps where the motion can be foreseen, single steps elsewhere: the results differ by round-off only. */
+/* Learn from a block: recurrences that guess no better than steps by Runge-Kutta are given up for a while, and so are
+   blocks that fail with those. */
+static void engel_geodesics_learn_from(engel_geodesics_solver *s, int passes)
+{
+    if (s->foreseeing && (passes == 0 || (passes > 1 && passes >= s->passes))) {
+        s->foreseeing = 0;
+        s->doubt = 2 * s->doubt + 2000;
+        s->retry = s->steps + s->doubt;
+    } else if (passes == 0) {
+        s->setback = 2 * s->setback + engel_geodesics_LANES > 1000 ? 1000 : 2 * s->setback + engel_geodesics_LANES;
+        s->pause = s->setback;
+    } else {
+        s->setback /= 2;
+        if (!s->foreseeing) s->passes = passes;
+    }
+}
+
+/* A single step, and the running mean of the evaluations that a stage of one takes. */
+static engel_geodesics_status engel_geodesics_single(engel_geodesics_solver *s)
+{
+    const size_t before = s->evaluations;
+    const engel_geodesics_status status = engel_geodesics_step(s, s->h);
+    s->effort += 0.125 * ((double)(s->evaluations - before) / 1 - s->effort);
+    return status;
+}
+
+/* Blocks of steps where they cost less than single steps, with at most as many passes over a block as 2 for each
+   evaluation in a single step. The results differ by round-off only. */
 engel_geodesics_status engel_geodesics_integrate(engel_geodesics_solver *s, double h, size_t steps)
 {
     engel_geodesics_table table;
+    engel_geodesics_status status = engel_geodesics_set_step(s, h);
     for (int stage = 0; stage < 1; ++stage) table.fits[stage] = -1;
-    while (steps > 0) {
-        if (s != NULL && engel_geodesics_may_block(s, h, steps)) {
+    while (status == engel_geodesics_OK && steps > 0) {
+        if (steps >= engel_geodesics_LANES && s->pause == 0) engel_geodesics_choose_guess(s, steps);
+        if (steps >= engel_geodesics_LANES && s->pause == 0) {
             engel_geodesics_tell(s, &table);
-            if (engel_geodesics_block(s, &table)) {
-                steps -= engel_geodesics_LANES;
-                s->setback /= 2;
-                continue;
-            }
-            s->setback = 2 * s->setback + engel_geodesics_LANES > 1000 ? 1000 : 2 * s->setback + engel_geodesics_LANES;
-            s->pause = s->setback;
+            const int passes = engel_geodesics_block(s, &table, (int)(2 * s->effort + 0.5));
+            engel_geodesics_learn_from(s, passes);
+            if (passes > 0) steps -= engel_geodesics_LANES;
+        } else {
+            if (s->pause > 0) --s->pause;
+            status = engel_geodesics_single(s);
+            if (status == engel_geodesics_OK) --steps;
         }
-        const engel_geodesics_status status = engel_geodesics_step(s, h);
-        if (status != engel_geodesics_OK) return status;
-        --steps;
     }
-    return engel_geodesics_OK;
+    return status;
 }
 
 engel_geodesics_status engel_geodesics_ensemble(const engel_geodesics_params *params, double *x,

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: d0e459074a404cb43f783093b823dbfa286cebd4747aecd2b5a66228136e049f
+ * body-sha256: ed937f6ae1a6b53358e3a79899739475498d77cd98637016e6011058c8102809
  */
 #ifndef ENGEL_GEODESICS_H
 #define ENGEL_GEODESICS_H
@@ -67,9 +67,13 @@ typedef struct {
     engel_geodesics_params params;
     double h;  /* the step size that coef belongs to */
     int ready; /* whether coef has been computed */
-    int pause;   /* steps to make singly before a block is tried */
-    int setback; /* the last pause, halved with every block that succeeds */
-    size_t fitted; /* steps when recurrences were last fitted for blocks */
+    double effort;  /* evaluations that a single step takes, for each stage */
+    int pause;      /* steps to make singly before a block is tried */
+    int setback;    /* the last pause, halved with every block that succeeds */
+    int foreseeing; /* whether blocks are guessed by recurrences */
+    int passes;     /* that the last block took which was not */
+    size_t doubt;   /* steps to wait before recurrences are tried again */
+    size_t retry;   /* steps after which that is */
     double coef[1][3]; /* what depends on params and h only, for each stage */
     engel_geodesics_memory memory[1];
 } engel_geodesics_solver;

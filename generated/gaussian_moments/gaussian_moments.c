@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: ac60c7b4199abdd79a7a056cb45c126f9e2803b8ef678fd5469c71331fc17aba
+ * body-sha256: fdbb15eaea8b4fc4d12fb8ed5acbad67284fb294745f625c3ed1b1bb2cc299eb
  */
 #include "gaussian_moments.h"
 
@@ -505,17 +505,28 @@ gaussian_moments_status gaussian_moments_init(gaussian_moments_solver *s,
     return gaussian_moments_OK;
 }
 
-gaussian_moments_status gaussian_moments_step(gaussian_moments_solver *s, double h)
+/* What depends on the step size; nothing where that is as before. */
+static gaussian_moments_status gaussian_moments_set_step(gaussian_moments_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return gaussian_moments_BAD_ARGUMENT;
-    if (!s->ready || memcmp(&h, &s->h, sizeof h) != 0) {
-        for (int stage = 0; stage < 1; ++stage)
-            gaussian_moments_prepare(&s->params, gaussian_moments_fractions[stage] * h, s->coef[stage]);
-        memset(s->memory, 0, sizeof s->memory);
-        s->h = h;
-        s->ready = 1;
-    }
-    const gaussian_moments_status status = gaussian_moments_stages(s);
+    if (s->ready && memcmp(&h, &s->h, sizeof h) == 0) return gaussian_moments_OK;
+    for (int stage = 0; stage < 1; ++stage)
+        gaussian_moments_prepare(&s->params, gaussian_moments_fractions[stage] * h, s->coef[stage]);
+    memset(s->memory, 0, sizeof s->memory);
+    s->pause = 16;
+    s->setback = s->foreseeing = 0;
+    s->doubt = s->retry = 0;
+    s->effort = 0.0;
+    s->h = h;
+    s->ready = 1;
+    return gaussian_moments_OK;
+}
+
+gaussian_moments_status gaussian_moments_step(gaussian_moments_solver *s, double h)
+{
+    gaussian_moments_status status = gaussian_moments_set_step(s, h);
+    if (status != gaussian_moments_OK) return status;
+    status = gaussian_moments_stages(s);
     if (status == gaussian_moments_OK) ++s->steps;
     return status;
 }
@@ -811,7 +822,7 @@ static void gaussian_moments_tell(const gaussian_moments_solver *s, gaussian_mom
     }
 }
 
-/* The guesses for the next gaussian_moments_LANES values. */
+/* Guesses for the next gaussian_moments_LANES values of a stage, by its recurrences. */
 static void gaussian_moments_foresee(const gaussian_moments_memory *memory, gaussian_moments_lanes weight[restrict][3],
     gaussian_moments_lanes y[restrict 3])
 {
@@ -851,14 +862,39 @@ static double gaussian_moments_correct(gaussian_moments_lines *line)
     return isfinite(total) ? largest : HUGE_VAL;
 }
 
+/* Guesses where no recurrence is known: midpoints of steps by the classical Runge-Kutta method. */
+static void gaussian_moments_march(const gaussian_moments_solver *s, gaussian_moments_lines line[1])
+{
+    static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
+    double x[3], point[3], slope[3], mean[3];
+    memcpy(x, s->x, sizeof x);
+    for (int k = 0; k < 1 * gaussian_moments_LANES; ++k) {
+        const double h = gaussian_moments_fractions[k % 1] * s->h;
+        memcpy(point, x, sizeof x);
+        memset(mean, 0, sizeof mean);
+        for (int part = 0; part < 4; ++part) {
+            gaussian_moments_vector_field(&s->params, point, slope);
+            for (int i = 0; i < 3; ++i) {
+                mean[i] += weight[part] * slope[i];
+                point[i] = x[i] + h * reach[part] * slope[i];
+            }
+        }
+        for (int i = 0; i < 3; ++i) {
+            line[k % 1].y[i][k / 1] = x[i] + 0.5 * h * mean[i];
+            x[i] += h * mean[i];
+        }
+    }
+}
+
 /* gaussian_moments_LANES steps at once: guess the points of all, and correct them together until the error that remains is as
-   small as after a single step. 0, and the solver as before, where that does not come about. */
-static int gaussian_moments_block(gaussian_moments_solver *s, gaussian_moments_table *table)
+   small as after a single step. How many passes that took; 0, and the solver as before, where it takes more than most. */
+static int gaussian_moments_block(gaussian_moments_solver *s, gaussian_moments_table *table, int most)
 {
     gaussian_moments_lines line[1];
     double x[3], carry[3], value[3], previous = HUGE_VAL;
     int passes = 0, solved = 0;
-    for (int stage = 0; stage < 1; ++stage)
+    if (!s->foreseeing) gaussian_moments_march(s, line);
+    for (int stage = 0; stage < 1 && s->foreseeing; ++stage)
         gaussian_moments_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
     while (!solved) {
         double size = 0.0;
@@ -871,12 +907,11 @@ static int gaussian_moments_block(gaussian_moments_solver *s, gaussian_moments_t
         const double growth = size / (previous * previous);
         /* The second test: after the square of so small a correction there is rounding only. */
         solved = size * size * (growth > 1.0 ? growth : 1.0) <= 1e-20 || (previous < 1e-8 && size < 1e-10);
-        if (++passes == 4 || !(size < previous)) break;
+        if ((++passes >= most || !(size < previous)) && !solved) return 0;
         previous = size;
     }
     for (int i = 0; i < 3; ++i)
         if (!isfinite(x[i])) return 0;
-    if (!solved) return 0;
     memcpy(s->x, x, sizeof x);
     memcpy(s->carry, carry, sizeof carry);
     s->steps += gaussian_moments_LANES;
@@ -887,52 +922,72 @@ static int gaussian_moments_block(gaussian_moments_solver *s, gaussian_moments_t
             gaussian_moments_record(memory, value);
         }
         memory->slow = passes > 1 ? memory->slow + gaussian_moments_LANES : 0;
-        if (memory->slow > memory->patience) gaussian_moments_fit(memory);
+        if (memory->slow > memory->patience && s->foreseeing) gaussian_moments_fit(memory);
     }
-    return 1;
+    return passes;
 }
 
-/* Whether a block may be tried: not before there are recurrences to guess with, and not for a while after one that
-   failed. They take a thousand steps to repay. */
-static int gaussian_moments_may_block(gaussian_moments_solver *s, double h, size_t steps)
+/* How the next block is guessed: by recurrences once they are fitted, which takes a thousand steps to repay. */
+static void gaussian_moments_choose_guess(gaussian_moments_solver *s, size_t steps)
 {
-    int fit = s->setback > 0 && s->steps - s->fitted >= 1000;
-    if (!s->ready || memcmp(&h, &s->h, sizeof h) != 0 || steps < gaussian_moments_LANES) return 0;
-    if (s->pause > 0) {
-        --s->pause;
-        return 0;
-    }
-    for (int stage = 0; stage < 1; ++stage) {
-        fit = fit || s->memory[stage].fits == 0;
-        if (s->memory[stage].count < 96) return 0;
-    }
-    if (fit && steps < 1000) return 0;
-    for (int stage = 0; stage < 1 && fit; ++stage) gaussian_moments_fit(&s->memory[stage]);
-    if (fit) s->fitted = s->steps;
-    return 1;
+    for (int stage = 0; stage < 1; ++stage)
+        if (s->memory[stage].count < 96) {
+            s->foreseeing = 0;
+            return;
+        }
+    if (s->foreseeing || steps < 1000 || s->steps < s->retry) return;
+    for (int stage = 0; stage < 1; ++stage) gaussian_moments_fit(&s->memory[stage]);
+    s->foreseeing = 1;
+    s->pause = gaussian_moments_LANES;
 }
 
-/* Blocks of steps where the motion can be foreseen, single steps elsewhere: the results differ by round-off only. */
+/* Learn from a block: recurrences that guess no better than steps by Runge-Kutta are given up for a while, and so are
+   blocks that fail with those. */
+static void gaussian_moments_learn_from(gaussian_moments_solver *s, int passes)
+{
+    if (s->foreseeing && (passes == 0 || (passes > 1 && passes >= s->passes))) {
+        s->foreseeing = 0;
+        s->doubt = 2 * s->doubt + 2000;
+        s->retry = s->steps + s->doubt;
+    } else if (passes == 0) {
+        s->setback = 2 * s->setback + gaussian_moments_LANES > 1000 ? 1000 : 2 * s->setback + gaussian_moments_LANES;
+        s->pause = s->setback;
+    } else {
+        s->setback /= 2;
+        if (!s->foreseeing) s->passes = passes;
+    }
+}
+
+/* A single step, and the running mean of the evaluations that a stage of one takes. */
+static gaussian_moments_status gaussian_moments_single(gaussian_moments_solver *s)
+{
+    const size_t before = s->evaluations;
+    const gaussian_moments_status status = gaussian_moments_step(s, s->h);
+    s->effort += 0.125 * ((double)(s->evaluations - before) / 1 - s->effort);
+    return status;
+}
+
+/* Blocks of steps where they cost less than single steps, with at most as many passes over a block as 2 for each
+   evaluation in a single step. The results differ by round-off only. */
 gaussian_moments_status gaussian_moments_integrate(gaussian_moments_solver *s, double h, size_t steps)
 {
     gaussian_moments_table table;
+    gaussian_moments_status status = gaussian_moments_set_step(s, h);
     for (int stage = 0; stage < 1; ++stage) table.fits[stage] = -1;
-    while (steps > 0) {
-        if (s != NULL && gaussian_moments_may_block(s, h, steps)) {
+    while (status == gaussian_moments_OK && steps > 0) {
+        if (steps >= gaussian_moments_LANES && s->pause == 0) gaussian_moments_choose_guess(s, steps);
+        if (steps >= gaussian_moments_LANES && s->pause == 0) {
             gaussian_moments_tell(s, &table);
-            if (gaussian_moments_block(s, &table)) {
-                steps -= gaussian_moments_LANES;
-                s->setback /= 2;
-                continue;
-            }
-            s->setback = 2 * s->setback + gaussian_moments_LANES > 1000 ? 1000 : 2 * s->setback + gaussian_moments_LANES;
-            s->pause = s->setback;
+            const int passes = gaussian_moments_block(s, &table, (int)(2 * s->effort + 0.5));
+            gaussian_moments_learn_from(s, passes);
+            if (passes > 0) steps -= gaussian_moments_LANES;
+        } else {
+            if (s->pause > 0) --s->pause;
+            status = gaussian_moments_single(s);
+            if (status == gaussian_moments_OK) --steps;
         }
-        const gaussian_moments_status status = gaussian_moments_step(s, h);
-        if (status != gaussian_moments_OK) return status;
-        --steps;
     }
-    return gaussian_moments_OK;
+    return status;
 }
 
 gaussian_moments_status gaussian_moments_ensemble(const gaussian_moments_params *params, double *x,

@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: f98736b1b09363bc9ff905d4a306d84c29591cba048cdd437e401a95bc58da19
+ * body-sha256: 3da7f4f16935a92ba64494a269946f820e0ae8d991c7c368ce5577c157f66848
  */
 #include "guiding_centre.h"
 
@@ -632,17 +632,24 @@ guiding_centre_status guiding_centre_init(guiding_centre_solver *s, const guidin
     return guiding_centre_OK;
 }
 
-guiding_centre_status guiding_centre_step(guiding_centre_solver *s, double h)
+/* What depends on the step size; nothing where that is as before. */
+static guiding_centre_status guiding_centre_set_step(guiding_centre_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return guiding_centre_BAD_ARGUMENT;
-    if (!s->ready || memcmp(&h, &s->h, sizeof h) != 0) {
-        for (int stage = 0; stage < 5; ++stage)
-            guiding_centre_prepare(&s->params, guiding_centre_fractions[stage] * h, s->coef[stage]);
-        memset(s->memory, 0, sizeof s->memory);
-        s->h = h;
-        s->ready = 1;
-    }
-    const guiding_centre_status status = guiding_centre_stages(s);
+    if (s->ready && memcmp(&h, &s->h, sizeof h) == 0) return guiding_centre_OK;
+    for (int stage = 0; stage < 5; ++stage)
+        guiding_centre_prepare(&s->params, guiding_centre_fractions[stage] * h, s->coef[stage]);
+    memset(s->memory, 0, sizeof s->memory);
+    s->h = h;
+    s->ready = 1;
+    return guiding_centre_OK;
+}
+
+guiding_centre_status guiding_centre_step(guiding_centre_solver *s, double h)
+{
+    guiding_centre_status status = guiding_centre_set_step(s, h);
+    if (status != guiding_centre_OK) return status;
+    status = guiding_centre_stages(s);
     if (status == guiding_centre_OK) ++s->steps;
     return status;
 }

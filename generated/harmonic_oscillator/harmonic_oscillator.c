@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 2cf81a1f796671e2bbe077e45cc2bcdcf070d155181ff3d767a5a4c26b9767f2
+ * body-sha256: 7fffb79550b1ec6739aa2b41c5db62c1e5ee652eeb9825e313f857b289bf2228
  */
 #include "harmonic_oscillator.h"
 
@@ -337,17 +337,28 @@ harmonic_oscillator_status harmonic_oscillator_init(harmonic_oscillator_solver *
     return harmonic_oscillator_OK;
 }
 
-harmonic_oscillator_status harmonic_oscillator_step(harmonic_oscillator_solver *s, double h)
+/* What depends on the step size; nothing where that is as before. */
+static harmonic_oscillator_status harmonic_oscillator_set_step(harmonic_oscillator_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return harmonic_oscillator_BAD_ARGUMENT;
-    if (!s->ready || memcmp(&h, &s->h, sizeof h) != 0) {
-        for (int stage = 0; stage < 1; ++stage)
-            harmonic_oscillator_prepare(&s->params, harmonic_oscillator_fractions[stage] * h, s->coef[stage]);
-        memset(s->memory, 0, sizeof s->memory);
-        s->h = h;
-        s->ready = 1;
-    }
-    const harmonic_oscillator_status status = harmonic_oscillator_stages(s);
+    if (s->ready && memcmp(&h, &s->h, sizeof h) == 0) return harmonic_oscillator_OK;
+    for (int stage = 0; stage < 1; ++stage)
+        harmonic_oscillator_prepare(&s->params, harmonic_oscillator_fractions[stage] * h, s->coef[stage]);
+    memset(s->memory, 0, sizeof s->memory);
+    s->pause = 16;
+    s->setback = s->foreseeing = 0;
+    s->doubt = s->retry = 0;
+    s->effort = 0.0;
+    s->h = h;
+    s->ready = 1;
+    return harmonic_oscillator_OK;
+}
+
+harmonic_oscillator_status harmonic_oscillator_step(harmonic_oscillator_solver *s, double h)
+{
+    harmonic_oscillator_status status = harmonic_oscillator_set_step(s, h);
+    if (status != harmonic_oscillator_OK) return status;
+    status = harmonic_oscillator_stages(s);
     if (status == harmonic_oscillator_OK) ++s->steps;
     return status;
 }
@@ -516,7 +527,7 @@ static void harmonic_oscillator_tell(const harmonic_oscillator_solver *s, harmon
     }
 }
 
-/* The guesses for the next harmonic_oscillator_LANES values. */
+/* Guesses for the next harmonic_oscillator_LANES values of a stage, by its recurrences. */
 static void harmonic_oscillator_foresee(const harmonic_oscillator_memory *memory, harmonic_oscillator_lanes weight[restrict][2],
     harmonic_oscillator_lanes y[restrict 2])
 {
@@ -556,14 +567,39 @@ static double harmonic_oscillator_correct(harmonic_oscillator_lines *line)
     return isfinite(total) ? largest : HUGE_VAL;
 }
 
+/* Guesses where no recurrence is known: midpoints of steps by the classical Runge-Kutta method. */
+static void harmonic_oscillator_march(const harmonic_oscillator_solver *s, harmonic_oscillator_lines line[1])
+{
+    static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
+    double x[2], point[2], slope[2], mean[2];
+    memcpy(x, s->x, sizeof x);
+    for (int k = 0; k < 1 * harmonic_oscillator_LANES; ++k) {
+        const double h = harmonic_oscillator_fractions[k % 1] * s->h;
+        memcpy(point, x, sizeof x);
+        memset(mean, 0, sizeof mean);
+        for (int part = 0; part < 4; ++part) {
+            harmonic_oscillator_vector_field(&s->params, point, slope);
+            for (int i = 0; i < 2; ++i) {
+                mean[i] += weight[part] * slope[i];
+                point[i] = x[i] + h * reach[part] * slope[i];
+            }
+        }
+        for (int i = 0; i < 2; ++i) {
+            line[k % 1].y[i][k / 1] = x[i] + 0.5 * h * mean[i];
+            x[i] += h * mean[i];
+        }
+    }
+}
+
 /* harmonic_oscillator_LANES steps at once: guess the points of all, and correct them together until the error that remains is as
-   small as after a single step. 0, and the solver as before, where that does not come about. */
-static int harmonic_oscillator_block(harmonic_oscillator_solver *s, harmonic_oscillator_table *table)
+   small as after a single step. How many passes that took; 0, and the solver as before, where it takes more than most. */
+static int harmonic_oscillator_block(harmonic_oscillator_solver *s, harmonic_oscillator_table *table, int most)
 {
     harmonic_oscillator_lines line[1];
     double x[2], carry[2], value[2], previous = HUGE_VAL;
     int passes = 0, solved = 0;
-    for (int stage = 0; stage < 1; ++stage)
+    if (!s->foreseeing) harmonic_oscillator_march(s, line);
+    for (int stage = 0; stage < 1 && s->foreseeing; ++stage)
         harmonic_oscillator_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
     while (!solved) {
         double size = 0.0;
@@ -576,12 +612,11 @@ static int harmonic_oscillator_block(harmonic_oscillator_solver *s, harmonic_osc
         const double growth = size / (previous * previous);
         /* The second test: after the square of so small a correction there is rounding only. */
         solved = size * size * (growth > 1.0 ? growth : 1.0) <= 1e-20 || (previous < 1e-8 && size < 1e-10);
-        if (++passes == 4 || !(size < previous)) break;
+        if ((++passes >= most || !(size < previous)) && !solved) return 0;
         previous = size;
     }
     for (int i = 0; i < 2; ++i)
         if (!isfinite(x[i])) return 0;
-    if (!solved) return 0;
     memcpy(s->x, x, sizeof x);
     memcpy(s->carry, carry, sizeof carry);
     s->steps += harmonic_oscillator_LANES;
@@ -592,52 +627,72 @@ static int harmonic_oscillator_block(harmonic_oscillator_solver *s, harmonic_osc
             harmonic_oscillator_record(memory, value);
         }
         memory->slow = passes > 1 ? memory->slow + harmonic_oscillator_LANES : 0;
-        if (memory->slow > memory->patience) harmonic_oscillator_fit(memory);
+        if (memory->slow > memory->patience && s->foreseeing) harmonic_oscillator_fit(memory);
     }
-    return 1;
+    return passes;
 }
 
-/* Whether a block may be tried: not before there are recurrences to guess with, and not for a while after one that
-   failed. They take a thousand steps to repay. */
-static int harmonic_oscillator_may_block(harmonic_oscillator_solver *s, double h, size_t steps)
+/* How the next block is guessed: by recurrences once they are fitted, which takes a thousand steps to repay. */
+static void harmonic_oscillator_choose_guess(harmonic_oscillator_solver *s, size_t steps)
 {
-    int fit = s->setback > 0 && s->steps - s->fitted >= 1000;
-    if (!s->ready || memcmp(&h, &s->h, sizeof h) != 0 || steps < harmonic_oscillator_LANES) return 0;
-    if (s->pause > 0) {
-        --s->pause;
-        return 0;
-    }
-    for (int stage = 0; stage < 1; ++stage) {
-        fit = fit || s->memory[stage].fits == 0;
-        if (s->memory[stage].count < 96) return 0;
-    }
-    if (fit && steps < 1000) return 0;
-    for (int stage = 0; stage < 1 && fit; ++stage) harmonic_oscillator_fit(&s->memory[stage]);
-    if (fit) s->fitted = s->steps;
-    return 1;
+    for (int stage = 0; stage < 1; ++stage)
+        if (s->memory[stage].count < 96) {
+            s->foreseeing = 0;
+            return;
+        }
+    if (s->foreseeing || steps < 1000 || s->steps < s->retry) return;
+    for (int stage = 0; stage < 1; ++stage) harmonic_oscillator_fit(&s->memory[stage]);
+    s->foreseeing = 1;
+    s->pause = harmonic_oscillator_LANES;
 }
 
-/* Blocks of steps where the motion can be foreseen, single steps elsewhere: the results differ by round-off only. */
+/* Learn from a block: recurrences that guess no better than steps by Runge-Kutta are given up for a while, and so are
+   blocks that fail with those. */
+static void harmonic_oscillator_learn_from(harmonic_oscillator_solver *s, int passes)
+{
+    if (s->foreseeing && (passes == 0 || (passes > 1 && passes >= s->passes))) {
+        s->foreseeing = 0;
+        s->doubt = 2 * s->doubt + 2000;
+        s->retry = s->steps + s->doubt;
+    } else if (passes == 0) {
+        s->setback = 2 * s->setback + harmonic_oscillator_LANES > 1000 ? 1000 : 2 * s->setback + harmonic_oscillator_LANES;
+        s->pause = s->setback;
+    } else {
+        s->setback /= 2;
+        if (!s->foreseeing) s->passes = passes;
+    }
+}
+
+/* A single step, and the running mean of the evaluations that a stage of one takes. */
+static harmonic_oscillator_status harmonic_oscillator_single(harmonic_oscillator_solver *s)
+{
+    const size_t before = s->evaluations;
+    const harmonic_oscillator_status status = harmonic_oscillator_step(s, s->h);
+    s->effort += 0.125 * ((double)(s->evaluations - before) / 1 - s->effort);
+    return status;
+}
+
+/* Blocks of steps where they cost less than single steps, with at most as many passes over a block as 2 for each
+   evaluation in a single step. The results differ by round-off only. */
 harmonic_oscillator_status harmonic_oscillator_integrate(harmonic_oscillator_solver *s, double h, size_t steps)
 {
     harmonic_oscillator_table table;
+    harmonic_oscillator_status status = harmonic_oscillator_set_step(s, h);
     for (int stage = 0; stage < 1; ++stage) table.fits[stage] = -1;
-    while (steps > 0) {
-        if (s != NULL && harmonic_oscillator_may_block(s, h, steps)) {
+    while (status == harmonic_oscillator_OK && steps > 0) {
+        if (steps >= harmonic_oscillator_LANES && s->pause == 0) harmonic_oscillator_choose_guess(s, steps);
+        if (steps >= harmonic_oscillator_LANES && s->pause == 0) {
             harmonic_oscillator_tell(s, &table);
-            if (harmonic_oscillator_block(s, &table)) {
-                steps -= harmonic_oscillator_LANES;
-                s->setback /= 2;
-                continue;
-            }
-            s->setback = 2 * s->setback + harmonic_oscillator_LANES > 1000 ? 1000 : 2 * s->setback + harmonic_oscillator_LANES;
-            s->pause = s->setback;
+            const int passes = harmonic_oscillator_block(s, &table, (int)(2 * s->effort + 0.5));
+            harmonic_oscillator_learn_from(s, passes);
+            if (passes > 0) steps -= harmonic_oscillator_LANES;
+        } else {
+            if (s->pause > 0) --s->pause;
+            status = harmonic_oscillator_single(s);
+            if (status == harmonic_oscillator_OK) --steps;
         }
-        const harmonic_oscillator_status status = harmonic_oscillator_step(s, h);
-        if (status != harmonic_oscillator_OK) return status;
-        --steps;
     }
-    return harmonic_oscillator_OK;
+    return status;
 }
 
 harmonic_oscillator_status harmonic_oscillator_ensemble(const harmonic_oscillator_params *params, double *x,

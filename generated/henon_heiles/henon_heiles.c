@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 9d8a3f58d8b7118f35316a1164dbb4ac1a3fadd6a46e2b9e1cb1f0a8174dfbc9
+ * body-sha256: fa600288af65468ae8884637872ff9a814df65751d811bae4ebef6b4bab0a621
  */
 #include "henon_heiles.h"
 
@@ -440,17 +440,28 @@ henon_heiles_status henon_heiles_init(henon_heiles_solver *s, const henon_heiles
     return henon_heiles_OK;
 }
 
-henon_heiles_status henon_heiles_step(henon_heiles_solver *s, double h)
+/* What depends on the step size; nothing where that is as before. */
+static henon_heiles_status henon_heiles_set_step(henon_heiles_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return henon_heiles_BAD_ARGUMENT;
-    if (!s->ready || memcmp(&h, &s->h, sizeof h) != 0) {
-        for (int stage = 0; stage < 1; ++stage)
-            henon_heiles_prepare(&s->params, henon_heiles_fractions[stage] * h, s->coef[stage]);
-        memset(s->memory, 0, sizeof s->memory);
-        s->h = h;
-        s->ready = 1;
-    }
-    const henon_heiles_status status = henon_heiles_stages(s);
+    if (s->ready && memcmp(&h, &s->h, sizeof h) == 0) return henon_heiles_OK;
+    for (int stage = 0; stage < 1; ++stage)
+        henon_heiles_prepare(&s->params, henon_heiles_fractions[stage] * h, s->coef[stage]);
+    memset(s->memory, 0, sizeof s->memory);
+    s->pause = 16;
+    s->setback = s->foreseeing = 0;
+    s->doubt = s->retry = 0;
+    s->effort = 0.0;
+    s->h = h;
+    s->ready = 1;
+    return henon_heiles_OK;
+}
+
+henon_heiles_status henon_heiles_step(henon_heiles_solver *s, double h)
+{
+    henon_heiles_status status = henon_heiles_set_step(s, h);
+    if (status != henon_heiles_OK) return status;
+    status = henon_heiles_stages(s);
     if (status == henon_heiles_OK) ++s->steps;
     return status;
 }
@@ -733,7 +744,7 @@ static void henon_heiles_tell(const henon_heiles_solver *s, henon_heiles_table *
     }
 }
 
-/* The guesses for the next henon_heiles_LANES values. */
+/* Guesses for the next henon_heiles_LANES values of a stage, by its recurrences. */
 static void henon_heiles_foresee(const henon_heiles_memory *memory, henon_heiles_lanes weight[restrict][4],
     henon_heiles_lanes y[restrict 4])
 {
@@ -773,14 +784,39 @@ static double henon_heiles_correct(henon_heiles_lines *line)
     return isfinite(total) ? largest : HUGE_VAL;
 }
 
+/* Guesses where no recurrence is known: midpoints of steps by the classical Runge-Kutta method. */
+static void henon_heiles_march(const henon_heiles_solver *s, henon_heiles_lines line[1])
+{
+    static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
+    double x[4], point[4], slope[4], mean[4];
+    memcpy(x, s->x, sizeof x);
+    for (int k = 0; k < 1 * henon_heiles_LANES; ++k) {
+        const double h = henon_heiles_fractions[k % 1] * s->h;
+        memcpy(point, x, sizeof x);
+        memset(mean, 0, sizeof mean);
+        for (int part = 0; part < 4; ++part) {
+            henon_heiles_vector_field(&s->params, point, slope);
+            for (int i = 0; i < 4; ++i) {
+                mean[i] += weight[part] * slope[i];
+                point[i] = x[i] + h * reach[part] * slope[i];
+            }
+        }
+        for (int i = 0; i < 4; ++i) {
+            line[k % 1].y[i][k / 1] = x[i] + 0.5 * h * mean[i];
+            x[i] += h * mean[i];
+        }
+    }
+}
+
 /* henon_heiles_LANES steps at once: guess the points of all, and correct them together until the error that remains is as
-   small as after a single step. 0, and the solver as before, where that does not come about. */
-static int henon_heiles_block(henon_heiles_solver *s, henon_heiles_table *table)
+   small as after a single step. How many passes that took; 0, and the solver as before, where it takes more than most. */
+static int henon_heiles_block(henon_heiles_solver *s, henon_heiles_table *table, int most)
 {
     henon_heiles_lines line[1];
     double x[4], carry[4], value[4], previous = HUGE_VAL;
     int passes = 0, solved = 0;
-    for (int stage = 0; stage < 1; ++stage)
+    if (!s->foreseeing) henon_heiles_march(s, line);
+    for (int stage = 0; stage < 1 && s->foreseeing; ++stage)
         henon_heiles_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
     while (!solved) {
         double size = 0.0;
@@ -793,12 +829,11 @@ static int henon_heiles_block(henon_heiles_solver *s, henon_heiles_table *table)
         const double growth = size / (previous * previous);
         /* The second test: after the square of so small a correction there is rounding only. */
         solved = size * size * (growth > 1.0 ? growth : 1.0) <= 1e-20 || (previous < 1e-8 && size < 1e-10);
-        if (++passes == 4 || !(size < previous)) break;
+        if ((++passes >= most || !(size < previous)) && !solved) return 0;
         previous = size;
     }
     for (int i = 0; i < 4; ++i)
         if (!isfinite(x[i])) return 0;
-    if (!solved) return 0;
     memcpy(s->x, x, sizeof x);
     memcpy(s->carry, carry, sizeof carry);
     s->steps += henon_heiles_LANES;
@@ -809,52 +844,72 @@ static int henon_heiles_block(henon_heiles_solver *s, henon_heiles_table *table)
             henon_heiles_record(memory, value);
         }
         memory->slow = passes > 1 ? memory->slow + henon_heiles_LANES : 0;
-        if (memory->slow > memory->patience) henon_heiles_fit(memory);
+        if (memory->slow > memory->patience && s->foreseeing) henon_heiles_fit(memory);
     }
-    return 1;
+    return passes;
 }
 
-/* Whether a block may be tried: not before there are recurrences to guess with, and not for a while after one that
-   failed. They take a thousand steps to repay. */
-static int henon_heiles_may_block(henon_heiles_solver *s, double h, size_t steps)
+/* How the next block is guessed: by recurrences once they are fitted, which takes a thousand steps to repay. */
+static void henon_heiles_choose_guess(henon_heiles_solver *s, size_t steps)
 {
-    int fit = s->setback > 0 && s->steps - s->fitted >= 1000;
-    if (!s->ready || memcmp(&h, &s->h, sizeof h) != 0 || steps < henon_heiles_LANES) return 0;
-    if (s->pause > 0) {
-        --s->pause;
-        return 0;
-    }
-    for (int stage = 0; stage < 1; ++stage) {
-        fit = fit || s->memory[stage].fits == 0;
-        if (s->memory[stage].count < 96) return 0;
-    }
-    if (fit && steps < 1000) return 0;
-    for (int stage = 0; stage < 1 && fit; ++stage) henon_heiles_fit(&s->memory[stage]);
-    if (fit) s->fitted = s->steps;
-    return 1;
+    for (int stage = 0; stage < 1; ++stage)
+        if (s->memory[stage].count < 96) {
+            s->foreseeing = 0;
+            return;
+        }
+    if (s->foreseeing || steps < 1000 || s->steps < s->retry) return;
+    for (int stage = 0; stage < 1; ++stage) henon_heiles_fit(&s->memory[stage]);
+    s->foreseeing = 1;
+    s->pause = henon_heiles_LANES;
 }
 
-/* Blocks of steps where the motion can be foreseen, single steps elsewhere: the results differ by round-off only. */
+/* Learn from a block: recurrences that guess no better than steps by Runge-Kutta are given up for a while, and so are
+   blocks that fail with those. */
+static void henon_heiles_learn_from(henon_heiles_solver *s, int passes)
+{
+    if (s->foreseeing && (passes == 0 || (passes > 1 && passes >= s->passes))) {
+        s->foreseeing = 0;
+        s->doubt = 2 * s->doubt + 2000;
+        s->retry = s->steps + s->doubt;
+    } else if (passes == 0) {
+        s->setback = 2 * s->setback + henon_heiles_LANES > 1000 ? 1000 : 2 * s->setback + henon_heiles_LANES;
+        s->pause = s->setback;
+    } else {
+        s->setback /= 2;
+        if (!s->foreseeing) s->passes = passes;
+    }
+}
+
+/* A single step, and the running mean of the evaluations that a stage of one takes. */
+static henon_heiles_status henon_heiles_single(henon_heiles_solver *s)
+{
+    const size_t before = s->evaluations;
+    const henon_heiles_status status = henon_heiles_step(s, s->h);
+    s->effort += 0.125 * ((double)(s->evaluations - before) / 1 - s->effort);
+    return status;
+}
+
+/* Blocks of steps where they cost less than single steps, with at most as many passes over a block as 2 for each
+   evaluation in a single step. The results differ by round-off only. */
 henon_heiles_status henon_heiles_integrate(henon_heiles_solver *s, double h, size_t steps)
 {
     henon_heiles_table table;
+    henon_heiles_status status = henon_heiles_set_step(s, h);
     for (int stage = 0; stage < 1; ++stage) table.fits[stage] = -1;
-    while (steps > 0) {
-        if (s != NULL && henon_heiles_may_block(s, h, steps)) {
+    while (status == henon_heiles_OK && steps > 0) {
+        if (steps >= henon_heiles_LANES && s->pause == 0) henon_heiles_choose_guess(s, steps);
+        if (steps >= henon_heiles_LANES && s->pause == 0) {
             henon_heiles_tell(s, &table);
-            if (henon_heiles_block(s, &table)) {
-                steps -= henon_heiles_LANES;
-                s->setback /= 2;
-                continue;
-            }
-            s->setback = 2 * s->setback + henon_heiles_LANES > 1000 ? 1000 : 2 * s->setback + henon_heiles_LANES;
-            s->pause = s->setback;
+            const int passes = henon_heiles_block(s, &table, (int)(2 * s->effort + 0.5));
+            henon_heiles_learn_from(s, passes);
+            if (passes > 0) steps -= henon_heiles_LANES;
+        } else {
+            if (s->pause > 0) --s->pause;
+            status = henon_heiles_single(s);
+            if (status == henon_heiles_OK) --steps;
         }
-        const henon_heiles_status status = henon_heiles_step(s, h);
-        if (status != henon_heiles_OK) return status;
-        --steps;
     }
-    return henon_heiles_OK;
+    return status;
 }
 
 henon_heiles_status henon_heiles_ensemble(const henon_heiles_params *params, double *x, size_t members,

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: c61370095d6f6b062f6cbda942cfac7f2952dbbbff50ee5423f34bac83b9bdf6
+ * body-sha256: 72493d8b33230922042a6481e2de53269488644216f3fc8b03ac694189729c29
  */
 #ifndef HENON_HEILES_H
 #define HENON_HEILES_H
@@ -67,9 +67,13 @@ typedef struct {
     henon_heiles_params params;
     double h;  /* the step size that coef belongs to */
     int ready; /* whether coef has been computed */
-    int pause;   /* steps to make singly before a block is tried */
-    int setback; /* the last pause, halved with every block that succeeds */
-    size_t fitted; /* steps when recurrences were last fitted for blocks */
+    double effort;  /* evaluations that a single step takes, for each stage */
+    int pause;      /* steps to make singly before a block is tried */
+    int setback;    /* the last pause, halved with every block that succeeds */
+    int foreseeing; /* whether blocks are guessed by recurrences */
+    int passes;     /* that the last block took which was not */
+    size_t doubt;   /* steps to wait before recurrences are tried again */
+    size_t retry;   /* steps after which that is */
     double coef[1][24]; /* what depends on params and h only, for each stage */
     henon_heiles_memory memory[1];
 } henon_heiles_solver;

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: fd8dfaa9fbea7cfee3918d033702edd7839f34ea8cf8058abb8d18d66628267f
+ * body-sha256: 398d708bb9be1c1504e80654c869d0ee9e2e265ed7f4bc2e6e59cd191af26fef
  */
 #include "kepler.h"
 
@@ -750,17 +750,28 @@ kepler_status kepler_init(kepler_solver *s, const kepler_params *params, const d
     return kepler_OK;
 }
 
-kepler_status kepler_step(kepler_solver *s, double h)
+/* What depends on the step size; nothing where that is as before. */
+static kepler_status kepler_set_step(kepler_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return kepler_BAD_ARGUMENT;
-    if (!s->ready || memcmp(&h, &s->h, sizeof h) != 0) {
-        for (int stage = 0; stage < 1; ++stage)
-            kepler_prepare(&s->params, kepler_fractions[stage] * h, s->coef[stage]);
-        memset(s->memory, 0, sizeof s->memory);
-        s->h = h;
-        s->ready = 1;
-    }
-    const kepler_status status = kepler_stages(s);
+    if (s->ready && memcmp(&h, &s->h, sizeof h) == 0) return kepler_OK;
+    for (int stage = 0; stage < 1; ++stage)
+        kepler_prepare(&s->params, kepler_fractions[stage] * h, s->coef[stage]);
+    memset(s->memory, 0, sizeof s->memory);
+    s->pause = 16;
+    s->setback = s->foreseeing = 0;
+    s->doubt = s->retry = 0;
+    s->effort = 0.0;
+    s->h = h;
+    s->ready = 1;
+    return kepler_OK;
+}
+
+kepler_status kepler_step(kepler_solver *s, double h)
+{
+    kepler_status status = kepler_set_step(s, h);
+    if (status != kepler_OK) return status;
+    status = kepler_stages(s);
     if (status == kepler_OK) ++s->steps;
     return status;
 }
@@ -1209,7 +1220,7 @@ static void kepler_tell(const kepler_solver *s, kepler_table *table)
     }
 }
 
-/* The guesses for the next kepler_LANES values. */
+/* Guesses for the next kepler_LANES values of a stage, by its recurrences. */
 static void kepler_foresee(const kepler_memory *memory, kepler_lanes weight[restrict][4],
     kepler_lanes y[restrict 4])
 {
@@ -1249,14 +1260,39 @@ static double kepler_correct(kepler_lines *line)
     return isfinite(total) ? largest : HUGE_VAL;
 }
 
+/* Guesses where no recurrence is known: midpoints of steps by the classical Runge-Kutta method. */
+static void kepler_march(const kepler_solver *s, kepler_lines line[1])
+{
+    static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
+    double x[4], point[4], slope[4], mean[4];
+    memcpy(x, s->x, sizeof x);
+    for (int k = 0; k < 1 * kepler_LANES; ++k) {
+        const double h = kepler_fractions[k % 1] * s->h;
+        memcpy(point, x, sizeof x);
+        memset(mean, 0, sizeof mean);
+        for (int part = 0; part < 4; ++part) {
+            kepler_vector_field(&s->params, point, slope);
+            for (int i = 0; i < 4; ++i) {
+                mean[i] += weight[part] * slope[i];
+                point[i] = x[i] + h * reach[part] * slope[i];
+            }
+        }
+        for (int i = 0; i < 4; ++i) {
+            line[k % 1].y[i][k / 1] = x[i] + 0.5 * h * mean[i];
+            x[i] += h * mean[i];
+        }
+    }
+}
+
 /* kepler_LANES steps at once: guess the points of all, and correct them together until the error that remains is as
-   small as after a single step. 0, and the solver as before, where that does not come about. */
-static int kepler_block(kepler_solver *s, kepler_table *table)
+   small as after a single step. How many passes that took; 0, and the solver as before, where it takes more than most. */
+static int kepler_block(kepler_solver *s, kepler_table *table, int most)
 {
     kepler_lines line[1];
     double x[4], carry[4], value[4], previous = HUGE_VAL;
     int passes = 0, solved = 0;
-    for (int stage = 0; stage < 1; ++stage)
+    if (!s->foreseeing) kepler_march(s, line);
+    for (int stage = 0; stage < 1 && s->foreseeing; ++stage)
         kepler_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
     while (!solved) {
         double size = 0.0;
@@ -1269,12 +1305,11 @@ static int kepler_block(kepler_solver *s, kepler_table *table)
         const double growth = size / (previous * previous);
         /* The second test: after the square of so small a correction there is rounding only. */
         solved = size * size * (growth > 1.0 ? growth : 1.0) <= 1e-20 || (previous < 1e-8 && size < 1e-10);
-        if (++passes == 4 || !(size < previous)) break;
+        if ((++passes >= most || !(size < previous)) && !solved) return 0;
         previous = size;
     }
     for (int i = 0; i < 4; ++i)
         if (!isfinite(x[i])) return 0;
-    if (!solved) return 0;
     memcpy(s->x, x, sizeof x);
     memcpy(s->carry, carry, sizeof carry);
     s->steps += kepler_LANES;
@@ -1285,52 +1320,72 @@ static int kepler_block(kepler_solver *s, kepler_table *table)
             kepler_record(memory, value);
         }
         memory->slow = passes > 1 ? memory->slow + kepler_LANES : 0;
-        if (memory->slow > memory->patience) kepler_fit(memory);
+        if (memory->slow > memory->patience && s->foreseeing) kepler_fit(memory);
     }
-    return 1;
+    return passes;
 }
 
-/* Whether a block may be tried: not before there are recurrences to guess with, and not for a while after one that
-   failed. They take a thousand steps to repay. */
-static int kepler_may_block(kepler_solver *s, double h, size_t steps)
+/* How the next block is guessed: by recurrences once they are fitted, which takes a thousand steps to repay. */
+static void kepler_choose_guess(kepler_solver *s, size_t steps)
 {
-    int fit = s->setback > 0 && s->steps - s->fitted >= 1000;
-    if (!s->ready || memcmp(&h, &s->h, sizeof h) != 0 || steps < kepler_LANES) return 0;
-    if (s->pause > 0) {
-        --s->pause;
-        return 0;
-    }
-    for (int stage = 0; stage < 1; ++stage) {
-        fit = fit || s->memory[stage].fits == 0;
-        if (s->memory[stage].count < 96) return 0;
-    }
-    if (fit && steps < 1000) return 0;
-    for (int stage = 0; stage < 1 && fit; ++stage) kepler_fit(&s->memory[stage]);
-    if (fit) s->fitted = s->steps;
-    return 1;
+    for (int stage = 0; stage < 1; ++stage)
+        if (s->memory[stage].count < 96) {
+            s->foreseeing = 0;
+            return;
+        }
+    if (s->foreseeing || steps < 1000 || s->steps < s->retry) return;
+    for (int stage = 0; stage < 1; ++stage) kepler_fit(&s->memory[stage]);
+    s->foreseeing = 1;
+    s->pause = kepler_LANES;
 }
 
-/* Blocks of steps where the motion can be foreseen, single steps elsewhere: the results differ by round-off only. */
+/* Learn from a block: recurrences that guess no better than steps by Runge-Kutta are given up for a while, and so are
+   blocks that fail with those. */
+static void kepler_learn_from(kepler_solver *s, int passes)
+{
+    if (s->foreseeing && (passes == 0 || (passes > 1 && passes >= s->passes))) {
+        s->foreseeing = 0;
+        s->doubt = 2 * s->doubt + 2000;
+        s->retry = s->steps + s->doubt;
+    } else if (passes == 0) {
+        s->setback = 2 * s->setback + kepler_LANES > 1000 ? 1000 : 2 * s->setback + kepler_LANES;
+        s->pause = s->setback;
+    } else {
+        s->setback /= 2;
+        if (!s->foreseeing) s->passes = passes;
+    }
+}
+
+/* A single step, and the running mean of the evaluations that a stage of one takes. */
+static kepler_status kepler_single(kepler_solver *s)
+{
+    const size_t before = s->evaluations;
+    const kepler_status status = kepler_step(s, s->h);
+    s->effort += 0.125 * ((double)(s->evaluations - before) / 1 - s->effort);
+    return status;
+}
+
+/* Blocks of steps where they cost less than single steps, with at most as many passes over a block as 2 for each
+   evaluation in a single step. The results differ by round-off only. */
 kepler_status kepler_integrate(kepler_solver *s, double h, size_t steps)
 {
     kepler_table table;
+    kepler_status status = kepler_set_step(s, h);
     for (int stage = 0; stage < 1; ++stage) table.fits[stage] = -1;
-    while (steps > 0) {
-        if (s != NULL && kepler_may_block(s, h, steps)) {
+    while (status == kepler_OK && steps > 0) {
+        if (steps >= kepler_LANES && s->pause == 0) kepler_choose_guess(s, steps);
+        if (steps >= kepler_LANES && s->pause == 0) {
             kepler_tell(s, &table);
-            if (kepler_block(s, &table)) {
-                steps -= kepler_LANES;
-                s->setback /= 2;
-                continue;
-            }
-            s->setback = 2 * s->setback + kepler_LANES > 1000 ? 1000 : 2 * s->setback + kepler_LANES;
-            s->pause = s->setback;
+            const int passes = kepler_block(s, &table, (int)(2 * s->effort + 0.5));
+            kepler_learn_from(s, passes);
+            if (passes > 0) steps -= kepler_LANES;
+        } else {
+            if (s->pause > 0) --s->pause;
+            status = kepler_single(s);
+            if (status == kepler_OK) --steps;
         }
-        const kepler_status status = kepler_step(s, h);
-        if (status != kepler_OK) return status;
-        --steps;
     }
-    return kepler_OK;
+    return status;
 }
 
 kepler_status kepler_ensemble(const kepler_params *params, double *x, size_t members, double h, size_t steps,

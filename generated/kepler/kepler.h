@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: b03f6aa095c7f21055576400063a7745332130aee3223c88fdd3a1995eefc532
+ * body-sha256: bb10f0fe631d68e1e57ac5c74e7a6a605cd3ce8c0b0ffcf8c288263124745b7d
  */
 #ifndef KEPLER_H
 #define KEPLER_H
@@ -67,9 +67,13 @@ typedef struct {
     kepler_params params;
     double h;  /* the step size that coef belongs to */
     int ready; /* whether coef has been computed */
-    int pause;   /* steps to make singly before a block is tried */
-    int setback; /* the last pause, halved with every block that succeeds */
-    size_t fitted; /* steps when recurrences were last fitted for blocks */
+    double effort;  /* evaluations that a single step takes, for each stage */
+    int pause;      /* steps to make singly before a block is tried */
+    int setback;    /* the last pause, halved with every block that succeeds */
+    int foreseeing; /* whether blocks are guessed by recurrences */
+    int passes;     /* that the last block took which was not */
+    size_t doubt;   /* steps to wait before recurrences are tried again */
+    size_t retry;   /* steps after which that is */
     double coef[1][118]; /* what depends on params and h only, for each stage */
     kepler_memory memory[1];
 } kepler_solver;

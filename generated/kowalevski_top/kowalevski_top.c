@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 47ed9785a580c34256b784e58feeb4e055a37e5444fb80e0a9f44ebfaf865768
+ * body-sha256: 02b7f15c4bcdfaf5a6bc28abdf072e6d0f1d943f08e0b9f9932d274fe07257c0
  */
 #include "kowalevski_top.h"
 
@@ -1264,17 +1264,28 @@ kowalevski_top_status kowalevski_top_init(kowalevski_top_solver *s, const kowale
     return kowalevski_top_OK;
 }
 
-kowalevski_top_status kowalevski_top_step(kowalevski_top_solver *s, double h)
+/* What depends on the step size; nothing where that is as before. */
+static kowalevski_top_status kowalevski_top_set_step(kowalevski_top_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return kowalevski_top_BAD_ARGUMENT;
-    if (!s->ready || memcmp(&h, &s->h, sizeof h) != 0) {
-        for (int stage = 0; stage < 1; ++stage)
-            kowalevski_top_prepare(&s->params, kowalevski_top_fractions[stage] * h, s->coef[stage]);
-        memset(s->memory, 0, sizeof s->memory);
-        s->h = h;
-        s->ready = 1;
-    }
-    const kowalevski_top_status status = kowalevski_top_stages(s);
+    if (s->ready && memcmp(&h, &s->h, sizeof h) == 0) return kowalevski_top_OK;
+    for (int stage = 0; stage < 1; ++stage)
+        kowalevski_top_prepare(&s->params, kowalevski_top_fractions[stage] * h, s->coef[stage]);
+    memset(s->memory, 0, sizeof s->memory);
+    s->pause = 16;
+    s->setback = s->foreseeing = 0;
+    s->doubt = s->retry = 0;
+    s->effort = 0.0;
+    s->h = h;
+    s->ready = 1;
+    return kowalevski_top_OK;
+}
+
+kowalevski_top_status kowalevski_top_step(kowalevski_top_solver *s, double h)
+{
+    kowalevski_top_status status = kowalevski_top_set_step(s, h);
+    if (status != kowalevski_top_OK) return status;
+    status = kowalevski_top_stages(s);
     if (status == kowalevski_top_OK) ++s->steps;
     return status;
 }
@@ -2166,7 +2177,7 @@ static void kowalevski_top_tell(const kowalevski_top_solver *s, kowalevski_top_t
     }
 }
 
-/* The guesses for the next kowalevski_top_LANES values. */
+/* Guesses for the next kowalevski_top_LANES values of a stage, by its recurrences. */
 static void kowalevski_top_foresee(const kowalevski_top_memory *memory, kowalevski_top_lanes weight[restrict][6],
     kowalevski_top_lanes y[restrict 6])
 {
@@ -2206,14 +2217,39 @@ static double kowalevski_top_correct(kowalevski_top_lines *line)
     return isfinite(total) ? largest : HUGE_VAL;
 }
 
+/* Guesses where no recurrence is known: midpoints of steps by the classical Runge-Kutta method. */
+static void kowalevski_top_march(const kowalevski_top_solver *s, kowalevski_top_lines line[1])
+{
+    static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
+    double x[6], point[6], slope[6], mean[6];
+    memcpy(x, s->x, sizeof x);
+    for (int k = 0; k < 1 * kowalevski_top_LANES; ++k) {
+        const double h = kowalevski_top_fractions[k % 1] * s->h;
+        memcpy(point, x, sizeof x);
+        memset(mean, 0, sizeof mean);
+        for (int part = 0; part < 4; ++part) {
+            kowalevski_top_vector_field(&s->params, point, slope);
+            for (int i = 0; i < 6; ++i) {
+                mean[i] += weight[part] * slope[i];
+                point[i] = x[i] + h * reach[part] * slope[i];
+            }
+        }
+        for (int i = 0; i < 6; ++i) {
+            line[k % 1].y[i][k / 1] = x[i] + 0.5 * h * mean[i];
+            x[i] += h * mean[i];
+        }
+    }
+}
+
 /* kowalevski_top_LANES steps at once: guess the points of all, and correct them together until the error that remains is as
-   small as after a single step. 0, and the solver as before, where that does not come about. */
-static int kowalevski_top_block(kowalevski_top_solver *s, kowalevski_top_table *table)
+   small as after a single step. How many passes that took; 0, and the solver as before, where it takes more than most. */
+static int kowalevski_top_block(kowalevski_top_solver *s, kowalevski_top_table *table, int most)
 {
     kowalevski_top_lines line[1];
     double x[6], carry[6], value[6], previous = HUGE_VAL;
     int passes = 0, solved = 0;
-    for (int stage = 0; stage < 1; ++stage)
+    if (!s->foreseeing) kowalevski_top_march(s, line);
+    for (int stage = 0; stage < 1 && s->foreseeing; ++stage)
         kowalevski_top_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
     while (!solved) {
         double size = 0.0;
@@ -2226,12 +2262,11 @@ static int kowalevski_top_block(kowalevski_top_solver *s, kowalevski_top_table *
         const double growth = size / (previous * previous);
         /* The second test: after the square of so small a correction there is rounding only. */
         solved = size * size * (growth > 1.0 ? growth : 1.0) <= 1e-20 || (previous < 1e-8 && size < 1e-10);
-        if (++passes == 4 || !(size < previous)) break;
+        if ((++passes >= most || !(size < previous)) && !solved) return 0;
         previous = size;
     }
     for (int i = 0; i < 6; ++i)
         if (!isfinite(x[i])) return 0;
-    if (!solved) return 0;
     memcpy(s->x, x, sizeof x);
     memcpy(s->carry, carry, sizeof carry);
     s->steps += kowalevski_top_LANES;
@@ -2242,52 +2277,72 @@ static int kowalevski_top_block(kowalevski_top_solver *s, kowalevski_top_table *
             kowalevski_top_record(memory, value);
         }
         memory->slow = passes > 1 ? memory->slow + kowalevski_top_LANES : 0;
-        if (memory->slow > memory->patience) kowalevski_top_fit(memory);
+        if (memory->slow > memory->patience && s->foreseeing) kowalevski_top_fit(memory);
     }
-    return 1;
+    return passes;
 }
 
-/* Whether a block may be tried: not before there are recurrences to guess with, and not for a while after one that
-   failed. They take a thousand steps to repay. */
-static int kowalevski_top_may_block(kowalevski_top_solver *s, double h, size_t steps)
+/* How the next block is guessed: by recurrences once they are fitted, which takes a thousand steps to repay. */
+static void kowalevski_top_choose_guess(kowalevski_top_solver *s, size_t steps)
 {
-    int fit = s->setback > 0 && s->steps - s->fitted >= 1000;
-    if (!s->ready || memcmp(&h, &s->h, sizeof h) != 0 || steps < kowalevski_top_LANES) return 0;
-    if (s->pause > 0) {
-        --s->pause;
-        return 0;
-    }
-    for (int stage = 0; stage < 1; ++stage) {
-        fit = fit || s->memory[stage].fits == 0;
-        if (s->memory[stage].count < 96) return 0;
-    }
-    if (fit && steps < 1000) return 0;
-    for (int stage = 0; stage < 1 && fit; ++stage) kowalevski_top_fit(&s->memory[stage]);
-    if (fit) s->fitted = s->steps;
-    return 1;
+    for (int stage = 0; stage < 1; ++stage)
+        if (s->memory[stage].count < 96) {
+            s->foreseeing = 0;
+            return;
+        }
+    if (s->foreseeing || steps < 1000 || s->steps < s->retry) return;
+    for (int stage = 0; stage < 1; ++stage) kowalevski_top_fit(&s->memory[stage]);
+    s->foreseeing = 1;
+    s->pause = kowalevski_top_LANES;
 }
 
-/* Blocks of steps where the motion can be foreseen, single steps elsewhere: the results differ by round-off only. */
+/* Learn from a block: recurrences that guess no better than steps by Runge-Kutta are given up for a while, and so are
+   blocks that fail with those. */
+static void kowalevski_top_learn_from(kowalevski_top_solver *s, int passes)
+{
+    if (s->foreseeing && (passes == 0 || (passes > 1 && passes >= s->passes))) {
+        s->foreseeing = 0;
+        s->doubt = 2 * s->doubt + 2000;
+        s->retry = s->steps + s->doubt;
+    } else if (passes == 0) {
+        s->setback = 2 * s->setback + kowalevski_top_LANES > 1000 ? 1000 : 2 * s->setback + kowalevski_top_LANES;
+        s->pause = s->setback;
+    } else {
+        s->setback /= 2;
+        if (!s->foreseeing) s->passes = passes;
+    }
+}
+
+/* A single step, and the running mean of the evaluations that a stage of one takes. */
+static kowalevski_top_status kowalevski_top_single(kowalevski_top_solver *s)
+{
+    const size_t before = s->evaluations;
+    const kowalevski_top_status status = kowalevski_top_step(s, s->h);
+    s->effort += 0.125 * ((double)(s->evaluations - before) / 1 - s->effort);
+    return status;
+}
+
+/* Blocks of steps where they cost less than single steps, with at most as many passes over a block as 2 for each
+   evaluation in a single step. The results differ by round-off only. */
 kowalevski_top_status kowalevski_top_integrate(kowalevski_top_solver *s, double h, size_t steps)
 {
     kowalevski_top_table table;
+    kowalevski_top_status status = kowalevski_top_set_step(s, h);
     for (int stage = 0; stage < 1; ++stage) table.fits[stage] = -1;
-    while (steps > 0) {
-        if (s != NULL && kowalevski_top_may_block(s, h, steps)) {
+    while (status == kowalevski_top_OK && steps > 0) {
+        if (steps >= kowalevski_top_LANES && s->pause == 0) kowalevski_top_choose_guess(s, steps);
+        if (steps >= kowalevski_top_LANES && s->pause == 0) {
             kowalevski_top_tell(s, &table);
-            if (kowalevski_top_block(s, &table)) {
-                steps -= kowalevski_top_LANES;
-                s->setback /= 2;
-                continue;
-            }
-            s->setback = 2 * s->setback + kowalevski_top_LANES > 1000 ? 1000 : 2 * s->setback + kowalevski_top_LANES;
-            s->pause = s->setback;
+            const int passes = kowalevski_top_block(s, &table, (int)(2 * s->effort + 0.5));
+            kowalevski_top_learn_from(s, passes);
+            if (passes > 0) steps -= kowalevski_top_LANES;
+        } else {
+            if (s->pause > 0) --s->pause;
+            status = kowalevski_top_single(s);
+            if (status == kowalevski_top_OK) --steps;
         }
-        const kowalevski_top_status status = kowalevski_top_step(s, h);
-        if (status != kowalevski_top_OK) return status;
-        --steps;
     }
-    return kowalevski_top_OK;
+    return status;
 }
 
 kowalevski_top_status kowalevski_top_ensemble(const kowalevski_top_params *params, double *x, size_t members,

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 6a453c55db44cea4e475e4ea1da47df478498085194692b66da5ad7d9ad1ab63
+ * body-sha256: 61666def89b4be64f1d3e3065d41f11f949006e53c029621d65eee01a9f2ee02
  */
 #include "lagrange_top.h"
 
@@ -858,17 +858,28 @@ lagrange_top_status lagrange_top_init(lagrange_top_solver *s, const lagrange_top
     return lagrange_top_OK;
 }
 
-lagrange_top_status lagrange_top_step(lagrange_top_solver *s, double h)
+/* What depends on the step size; nothing where that is as before. */
+static lagrange_top_status lagrange_top_set_step(lagrange_top_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return lagrange_top_BAD_ARGUMENT;
-    if (!s->ready || memcmp(&h, &s->h, sizeof h) != 0) {
-        for (int stage = 0; stage < 1; ++stage)
-            lagrange_top_prepare(&s->params, lagrange_top_fractions[stage] * h, s->coef[stage]);
-        memset(s->memory, 0, sizeof s->memory);
-        s->h = h;
-        s->ready = 1;
-    }
-    const lagrange_top_status status = lagrange_top_stages(s);
+    if (s->ready && memcmp(&h, &s->h, sizeof h) == 0) return lagrange_top_OK;
+    for (int stage = 0; stage < 1; ++stage)
+        lagrange_top_prepare(&s->params, lagrange_top_fractions[stage] * h, s->coef[stage]);
+    memset(s->memory, 0, sizeof s->memory);
+    s->pause = 16;
+    s->setback = s->foreseeing = 0;
+    s->doubt = s->retry = 0;
+    s->effort = 0.0;
+    s->h = h;
+    s->ready = 1;
+    return lagrange_top_OK;
+}
+
+lagrange_top_status lagrange_top_step(lagrange_top_solver *s, double h)
+{
+    lagrange_top_status status = lagrange_top_set_step(s, h);
+    if (status != lagrange_top_OK) return status;
+    status = lagrange_top_stages(s);
     if (status == lagrange_top_OK) ++s->steps;
     return status;
 }
@@ -1513,7 +1524,7 @@ static void lagrange_top_tell(const lagrange_top_solver *s, lagrange_top_table *
     }
 }
 
-/* The guesses for the next lagrange_top_LANES values. */
+/* Guesses for the next lagrange_top_LANES values of a stage, by its recurrences. */
 static void lagrange_top_foresee(const lagrange_top_memory *memory, lagrange_top_lanes weight[restrict][6],
     lagrange_top_lanes y[restrict 6])
 {
@@ -1553,14 +1564,39 @@ static double lagrange_top_correct(lagrange_top_lines *line)
     return isfinite(total) ? largest : HUGE_VAL;
 }
 
+/* Guesses where no recurrence is known: midpoints of steps by the classical Runge-Kutta method. */
+static void lagrange_top_march(const lagrange_top_solver *s, lagrange_top_lines line[1])
+{
+    static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
+    double x[6], point[6], slope[6], mean[6];
+    memcpy(x, s->x, sizeof x);
+    for (int k = 0; k < 1 * lagrange_top_LANES; ++k) {
+        const double h = lagrange_top_fractions[k % 1] * s->h;
+        memcpy(point, x, sizeof x);
+        memset(mean, 0, sizeof mean);
+        for (int part = 0; part < 4; ++part) {
+            lagrange_top_vector_field(&s->params, point, slope);
+            for (int i = 0; i < 6; ++i) {
+                mean[i] += weight[part] * slope[i];
+                point[i] = x[i] + h * reach[part] * slope[i];
+            }
+        }
+        for (int i = 0; i < 6; ++i) {
+            line[k % 1].y[i][k / 1] = x[i] + 0.5 * h * mean[i];
+            x[i] += h * mean[i];
+        }
+    }
+}
+
 /* lagrange_top_LANES steps at once: guess the points of all, and correct them together until the error that remains is as
-   small as after a single step. 0, and the solver as before, where that does not come about. */
-static int lagrange_top_block(lagrange_top_solver *s, lagrange_top_table *table)
+   small as after a single step. How many passes that took; 0, and the solver as before, where it takes more than most. */
+static int lagrange_top_block(lagrange_top_solver *s, lagrange_top_table *table, int most)
 {
     lagrange_top_lines line[1];
     double x[6], carry[6], value[6], previous = HUGE_VAL;
     int passes = 0, solved = 0;
-    for (int stage = 0; stage < 1; ++stage)
+    if (!s->foreseeing) lagrange_top_march(s, line);
+    for (int stage = 0; stage < 1 && s->foreseeing; ++stage)
         lagrange_top_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
     while (!solved) {
         double size = 0.0;
@@ -1573,12 +1609,11 @@ static int lagrange_top_block(lagrange_top_solver *s, lagrange_top_table *table)
         const double growth = size / (previous * previous);
         /* The second test: after the square of so small a correction there is rounding only. */
         solved = size * size * (growth > 1.0 ? growth : 1.0) <= 1e-20 || (previous < 1e-8 && size < 1e-10);
-        if (++passes == 4 || !(size < previous)) break;
+        if ((++passes >= most || !(size < previous)) && !solved) return 0;
         previous = size;
     }
     for (int i = 0; i < 6; ++i)
         if (!isfinite(x[i])) return 0;
-    if (!solved) return 0;
     memcpy(s->x, x, sizeof x);
     memcpy(s->carry, carry, sizeof carry);
     s->steps += lagrange_top_LANES;
@@ -1589,52 +1624,72 @@ static int lagrange_top_block(lagrange_top_solver *s, lagrange_top_table *table)
             lagrange_top_record(memory, value);
         }
         memory->slow = passes > 1 ? memory->slow + lagrange_top_LANES : 0;
-        if (memory->slow > memory->patience) lagrange_top_fit(memory);
+        if (memory->slow > memory->patience && s->foreseeing) lagrange_top_fit(memory);
     }
-    return 1;
+    return passes;
 }
 
-/* Whether a block may be tried: not before there are recurrences to guess with, and not for a while after one that
-   failed. They take a thousand steps to repay. */
-static int lagrange_top_may_block(lagrange_top_solver *s, double h, size_t steps)
+/* How the next block is guessed: by recurrences once they are fitted, which takes a thousand steps to repay. */
+static void lagrange_top_choose_guess(lagrange_top_solver *s, size_t steps)
 {
-    int fit = s->setback > 0 && s->steps - s->fitted >= 1000;
-    if (!s->ready || memcmp(&h, &s->h, sizeof h) != 0 || steps < lagrange_top_LANES) return 0;
-    if (s->pause > 0) {
-        --s->pause;
-        return 0;
-    }
-    for (int stage = 0; stage < 1; ++stage) {
-        fit = fit || s->memory[stage].fits == 0;
-        if (s->memory[stage].count < 96) return 0;
-    }
-    if (fit && steps < 1000) return 0;
-    for (int stage = 0; stage < 1 && fit; ++stage) lagrange_top_fit(&s->memory[stage]);
-    if (fit) s->fitted = s->steps;
-    return 1;
+    for (int stage = 0; stage < 1; ++stage)
+        if (s->memory[stage].count < 96) {
+            s->foreseeing = 0;
+            return;
+        }
+    if (s->foreseeing || steps < 1000 || s->steps < s->retry) return;
+    for (int stage = 0; stage < 1; ++stage) lagrange_top_fit(&s->memory[stage]);
+    s->foreseeing = 1;
+    s->pause = lagrange_top_LANES;
 }
 
-/* Blocks of steps where the motion can be foreseen, single steps elsewhere: the results differ by round-off only. */
+/* Learn from a block: recurrences that guess no better than steps by Runge-Kutta are given up for a while, and so are
+   blocks that fail with those. */
+static void lagrange_top_learn_from(lagrange_top_solver *s, int passes)
+{
+    if (s->foreseeing && (passes == 0 || (passes > 1 && passes >= s->passes))) {
+        s->foreseeing = 0;
+        s->doubt = 2 * s->doubt + 2000;
+        s->retry = s->steps + s->doubt;
+    } else if (passes == 0) {
+        s->setback = 2 * s->setback + lagrange_top_LANES > 1000 ? 1000 : 2 * s->setback + lagrange_top_LANES;
+        s->pause = s->setback;
+    } else {
+        s->setback /= 2;
+        if (!s->foreseeing) s->passes = passes;
+    }
+}
+
+/* A single step, and the running mean of the evaluations that a stage of one takes. */
+static lagrange_top_status lagrange_top_single(lagrange_top_solver *s)
+{
+    const size_t before = s->evaluations;
+    const lagrange_top_status status = lagrange_top_step(s, s->h);
+    s->effort += 0.125 * ((double)(s->evaluations - before) / 1 - s->effort);
+    return status;
+}
+
+/* Blocks of steps where they cost less than single steps, with at most as many passes over a block as 2 for each
+   evaluation in a single step. The results differ by round-off only. */
 lagrange_top_status lagrange_top_integrate(lagrange_top_solver *s, double h, size_t steps)
 {
     lagrange_top_table table;
+    lagrange_top_status status = lagrange_top_set_step(s, h);
     for (int stage = 0; stage < 1; ++stage) table.fits[stage] = -1;
-    while (steps > 0) {
-        if (s != NULL && lagrange_top_may_block(s, h, steps)) {
+    while (status == lagrange_top_OK && steps > 0) {
+        if (steps >= lagrange_top_LANES && s->pause == 0) lagrange_top_choose_guess(s, steps);
+        if (steps >= lagrange_top_LANES && s->pause == 0) {
             lagrange_top_tell(s, &table);
-            if (lagrange_top_block(s, &table)) {
-                steps -= lagrange_top_LANES;
-                s->setback /= 2;
-                continue;
-            }
-            s->setback = 2 * s->setback + lagrange_top_LANES > 1000 ? 1000 : 2 * s->setback + lagrange_top_LANES;
-            s->pause = s->setback;
+            const int passes = lagrange_top_block(s, &table, (int)(2 * s->effort + 0.5));
+            lagrange_top_learn_from(s, passes);
+            if (passes > 0) steps -= lagrange_top_LANES;
+        } else {
+            if (s->pause > 0) --s->pause;
+            status = lagrange_top_single(s);
+            if (status == lagrange_top_OK) --steps;
         }
-        const lagrange_top_status status = lagrange_top_step(s, h);
-        if (status != lagrange_top_OK) return status;
-        --steps;
     }
-    return lagrange_top_OK;
+    return status;
 }
 
 lagrange_top_status lagrange_top_ensemble(const lagrange_top_params *params, double *x, size_t members,

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 1d4059a95426a1d88624691fffd690ef034e0b51e67a86e54337074bd7b1d6b8
+ * body-sha256: 19cbd6f22f95e7bdd824285194ccdf1caa77d4b04f42e377bc9641990261bec4
  */
 #include "lotka_volterra.h"
 
@@ -374,17 +374,28 @@ lotka_volterra_status lotka_volterra_init(lotka_volterra_solver *s, const lotka_
     return lotka_volterra_OK;
 }
 
-lotka_volterra_status lotka_volterra_step(lotka_volterra_solver *s, double h)
+/* What depends on the step size; nothing where that is as before. */
+static lotka_volterra_status lotka_volterra_set_step(lotka_volterra_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return lotka_volterra_BAD_ARGUMENT;
-    if (!s->ready || memcmp(&h, &s->h, sizeof h) != 0) {
-        for (int stage = 0; stage < 1; ++stage)
-            lotka_volterra_prepare(&s->params, lotka_volterra_fractions[stage] * h, s->coef[stage]);
-        memset(s->memory, 0, sizeof s->memory);
-        s->h = h;
-        s->ready = 1;
-    }
-    const lotka_volterra_status status = lotka_volterra_stages(s);
+    if (s->ready && memcmp(&h, &s->h, sizeof h) == 0) return lotka_volterra_OK;
+    for (int stage = 0; stage < 1; ++stage)
+        lotka_volterra_prepare(&s->params, lotka_volterra_fractions[stage] * h, s->coef[stage]);
+    memset(s->memory, 0, sizeof s->memory);
+    s->pause = 16;
+    s->setback = s->foreseeing = 0;
+    s->doubt = s->retry = 0;
+    s->effort = 0.0;
+    s->h = h;
+    s->ready = 1;
+    return lotka_volterra_OK;
+}
+
+lotka_volterra_status lotka_volterra_step(lotka_volterra_solver *s, double h)
+{
+    lotka_volterra_status status = lotka_volterra_set_step(s, h);
+    if (status != lotka_volterra_OK) return status;
+    status = lotka_volterra_stages(s);
     if (status == lotka_volterra_OK) ++s->steps;
     return status;
 }
@@ -640,7 +651,7 @@ static void lotka_volterra_tell(const lotka_volterra_solver *s, lotka_volterra_t
     }
 }
 
-/* The guesses for the next lotka_volterra_LANES values. */
+/* Guesses for the next lotka_volterra_LANES values of a stage, by its recurrences. */
 static void lotka_volterra_foresee(const lotka_volterra_memory *memory, lotka_volterra_lanes weight[restrict][3],
     lotka_volterra_lanes y[restrict 3])
 {
@@ -680,14 +691,39 @@ static double lotka_volterra_correct(lotka_volterra_lines *line)
     return isfinite(total) ? largest : HUGE_VAL;
 }
 
+/* Guesses where no recurrence is known: midpoints of steps by the classical Runge-Kutta method. */
+static void lotka_volterra_march(const lotka_volterra_solver *s, lotka_volterra_lines line[1])
+{
+    static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
+    double x[3], point[3], slope[3], mean[3];
+    memcpy(x, s->x, sizeof x);
+    for (int k = 0; k < 1 * lotka_volterra_LANES; ++k) {
+        const double h = lotka_volterra_fractions[k % 1] * s->h;
+        memcpy(point, x, sizeof x);
+        memset(mean, 0, sizeof mean);
+        for (int part = 0; part < 4; ++part) {
+            lotka_volterra_vector_field(&s->params, point, slope);
+            for (int i = 0; i < 3; ++i) {
+                mean[i] += weight[part] * slope[i];
+                point[i] = x[i] + h * reach[part] * slope[i];
+            }
+        }
+        for (int i = 0; i < 3; ++i) {
+            line[k % 1].y[i][k / 1] = x[i] + 0.5 * h * mean[i];
+            x[i] += h * mean[i];
+        }
+    }
+}
+
 /* lotka_volterra_LANES steps at once: guess the points of all, and correct them together until the error that remains is as
-   small as after a single step. 0, and the solver as before, where that does not come about. */
-static int lotka_volterra_block(lotka_volterra_solver *s, lotka_volterra_table *table)
+   small as after a single step. How many passes that took; 0, and the solver as before, where it takes more than most. */
+static int lotka_volterra_block(lotka_volterra_solver *s, lotka_volterra_table *table, int most)
 {
     lotka_volterra_lines line[1];
     double x[3], carry[3], value[3], previous = HUGE_VAL;
     int passes = 0, solved = 0;
-    for (int stage = 0; stage < 1; ++stage)
+    if (!s->foreseeing) lotka_volterra_march(s, line);
+    for (int stage = 0; stage < 1 && s->foreseeing; ++stage)
         lotka_volterra_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
     while (!solved) {
         double size = 0.0;
@@ -700,12 +736,11 @@ static int lotka_volterra_block(lotka_volterra_solver *s, lotka_volterra_table *
         const double growth = size / (previous * previous);
         /* The second test: after the square of so small a correction there is rounding only. */
         solved = size * size * (growth > 1.0 ? growth : 1.0) <= 1e-20 || (previous < 1e-8 && size < 1e-10);
-        if (++passes == 4 || !(size < previous)) break;
+        if ((++passes >= most || !(size < previous)) && !solved) return 0;
         previous = size;
     }
     for (int i = 0; i < 3; ++i)
         if (!isfinite(x[i])) return 0;
-    if (!solved) return 0;
     memcpy(s->x, x, sizeof x);
     memcpy(s->carry, carry, sizeof carry);
     s->steps += lotka_volterra_LANES;
@@ -716,52 +751,72 @@ static int lotka_volterra_block(lotka_volterra_solver *s, lotka_volterra_table *
             lotka_volterra_record(memory, value);
         }
         memory->slow = passes > 1 ? memory->slow + lotka_volterra_LANES : 0;
-        if (memory->slow > memory->patience) lotka_volterra_fit(memory);
+        if (memory->slow > memory->patience && s->foreseeing) lotka_volterra_fit(memory);
     }
-    return 1;
+    return passes;
 }
 
-/* Whether a block may be tried: not before there are recurrences to guess with, and not for a while after one that
-   failed. They take a thousand steps to repay. */
-static int lotka_volterra_may_block(lotka_volterra_solver *s, double h, size_t steps)
+/* How the next block is guessed: by recurrences once they are fitted, which takes a thousand steps to repay. */
+static void lotka_volterra_choose_guess(lotka_volterra_solver *s, size_t steps)
 {
-    int fit = s->setback > 0 && s->steps - s->fitted >= 1000;
-    if (!s->ready || memcmp(&h, &s->h, sizeof h) != 0 || steps < lotka_volterra_LANES) return 0;
-    if (s->pause > 0) {
-        --s->pause;
-        return 0;
-    }
-    for (int stage = 0; stage < 1; ++stage) {
-        fit = fit || s->memory[stage].fits == 0;
-        if (s->memory[stage].count < 96) return 0;
-    }
-    if (fit && steps < 1000) return 0;
-    for (int stage = 0; stage < 1 && fit; ++stage) lotka_volterra_fit(&s->memory[stage]);
-    if (fit) s->fitted = s->steps;
-    return 1;
+    for (int stage = 0; stage < 1; ++stage)
+        if (s->memory[stage].count < 96) {
+            s->foreseeing = 0;
+            return;
+        }
+    if (s->foreseeing || steps < 1000 || s->steps < s->retry) return;
+    for (int stage = 0; stage < 1; ++stage) lotka_volterra_fit(&s->memory[stage]);
+    s->foreseeing = 1;
+    s->pause = lotka_volterra_LANES;
 }
 
-/* Blocks of steps where the motion can be foreseen, single steps elsewhere: the results differ by round-off only. */
+/* Learn from a block: recurrences that guess no better than steps by Runge-Kutta are given up for a while, and so are
+   blocks that fail with those. */
+static void lotka_volterra_learn_from(lotka_volterra_solver *s, int passes)
+{
+    if (s->foreseeing && (passes == 0 || (passes > 1 && passes >= s->passes))) {
+        s->foreseeing = 0;
+        s->doubt = 2 * s->doubt + 2000;
+        s->retry = s->steps + s->doubt;
+    } else if (passes == 0) {
+        s->setback = 2 * s->setback + lotka_volterra_LANES > 1000 ? 1000 : 2 * s->setback + lotka_volterra_LANES;
+        s->pause = s->setback;
+    } else {
+        s->setback /= 2;
+        if (!s->foreseeing) s->passes = passes;
+    }
+}
+
+/* A single step, and the running mean of the evaluations that a stage of one takes. */
+static lotka_volterra_status lotka_volterra_single(lotka_volterra_solver *s)
+{
+    const size_t before = s->evaluations;
+    const lotka_volterra_status status = lotka_volterra_step(s, s->h);
+    s->effort += 0.125 * ((double)(s->evaluations - before) / 1 - s->effort);
+    return status;
+}
+
+/* Blocks of steps where they cost less than single steps, with at most as many passes over a block as 2 for each
+   evaluation in a single step. The results differ by round-off only. */
 lotka_volterra_status lotka_volterra_integrate(lotka_volterra_solver *s, double h, size_t steps)
 {
     lotka_volterra_table table;
+    lotka_volterra_status status = lotka_volterra_set_step(s, h);
     for (int stage = 0; stage < 1; ++stage) table.fits[stage] = -1;
-    while (steps > 0) {
-        if (s != NULL && lotka_volterra_may_block(s, h, steps)) {
+    while (status == lotka_volterra_OK && steps > 0) {
+        if (steps >= lotka_volterra_LANES && s->pause == 0) lotka_volterra_choose_guess(s, steps);
+        if (steps >= lotka_volterra_LANES && s->pause == 0) {
             lotka_volterra_tell(s, &table);
-            if (lotka_volterra_block(s, &table)) {
-                steps -= lotka_volterra_LANES;
-                s->setback /= 2;
-                continue;
-            }
-            s->setback = 2 * s->setback + lotka_volterra_LANES > 1000 ? 1000 : 2 * s->setback + lotka_volterra_LANES;
-            s->pause = s->setback;
+            const int passes = lotka_volterra_block(s, &table, (int)(2 * s->effort + 0.5));
+            lotka_volterra_learn_from(s, passes);
+            if (passes > 0) steps -= lotka_volterra_LANES;
+        } else {
+            if (s->pause > 0) --s->pause;
+            status = lotka_volterra_single(s);
+            if (status == lotka_volterra_OK) --steps;
         }
-        const lotka_volterra_status status = lotka_volterra_step(s, h);
-        if (status != lotka_volterra_OK) return status;
-        --steps;
     }
-    return lotka_volterra_OK;
+    return status;
 }
 
 lotka_volterra_status lotka_volterra_ensemble(const lotka_volterra_params *params, double *x, size_t members,

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 45ee487e5ae4df170b11f806ad9ce8f1a0e9af3840f75fb99fe4f4c4d915f320
+ * body-sha256: 29e49b0fffcc9d7f4bf12029c1f0279f461d6b63ad61bbbe47cb9ab6ecebdbf1
  */
 #ifndef LOTKA_VOLTERRA_H
 #define LOTKA_VOLTERRA_H
@@ -67,9 +67,13 @@ typedef struct {
     lotka_volterra_params params;
     double h;  /* the step size that coef belongs to */
     int ready; /* whether coef has been computed */
-    int pause;   /* steps to make singly before a block is tried */
-    int setback; /* the last pause, halved with every block that succeeds */
-    size_t fitted; /* steps when recurrences were last fitted for blocks */
+    double effort;  /* evaluations that a single step takes, for each stage */
+    int pause;      /* steps to make singly before a block is tried */
+    int setback;    /* the last pause, halved with every block that succeeds */
+    int foreseeing; /* whether blocks are guessed by recurrences */
+    int passes;     /* that the last block took which was not */
+    size_t doubt;   /* steps to wait before recurrences are tried again */
+    size_t retry;   /* steps after which that is */
     double coef[1][1]; /* what depends on params and h only, for each stage */
     lotka_volterra_memory memory[1];
 } lotka_volterra_solver;

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 903676a3707de296a687770fdae40c25cf2a322d9296ee55f413e3cd1142b512
+ * body-sha256: 9f2239a40a16517dc49887b58940da0d9acafd27bd42e88534b93b8537b5897b
  */
 #include "maxwell_bloch.h"
 
@@ -364,17 +364,28 @@ maxwell_bloch_status maxwell_bloch_init(maxwell_bloch_solver *s, const maxwell_b
     return maxwell_bloch_OK;
 }
 
-maxwell_bloch_status maxwell_bloch_step(maxwell_bloch_solver *s, double h)
+/* What depends on the step size; nothing where that is as before. */
+static maxwell_bloch_status maxwell_bloch_set_step(maxwell_bloch_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return maxwell_bloch_BAD_ARGUMENT;
-    if (!s->ready || memcmp(&h, &s->h, sizeof h) != 0) {
-        for (int stage = 0; stage < 1; ++stage)
-            maxwell_bloch_prepare(&s->params, maxwell_bloch_fractions[stage] * h, s->coef[stage]);
-        memset(s->memory, 0, sizeof s->memory);
-        s->h = h;
-        s->ready = 1;
-    }
-    const maxwell_bloch_status status = maxwell_bloch_stages(s);
+    if (s->ready && memcmp(&h, &s->h, sizeof h) == 0) return maxwell_bloch_OK;
+    for (int stage = 0; stage < 1; ++stage)
+        maxwell_bloch_prepare(&s->params, maxwell_bloch_fractions[stage] * h, s->coef[stage]);
+    memset(s->memory, 0, sizeof s->memory);
+    s->pause = 16;
+    s->setback = s->foreseeing = 0;
+    s->doubt = s->retry = 0;
+    s->effort = 0.0;
+    s->h = h;
+    s->ready = 1;
+    return maxwell_bloch_OK;
+}
+
+maxwell_bloch_status maxwell_bloch_step(maxwell_bloch_solver *s, double h)
+{
+    maxwell_bloch_status status = maxwell_bloch_set_step(s, h);
+    if (status != maxwell_bloch_OK) return status;
+    status = maxwell_bloch_stages(s);
     if (status == maxwell_bloch_OK) ++s->steps;
     return status;
 }
@@ -590,7 +601,7 @@ static void maxwell_bloch_tell(const maxwell_bloch_solver *s, maxwell_bloch_tabl
     }
 }
 
-/* The guesses for the next maxwell_bloch_LANES values. */
+/* Guesses for the next maxwell_bloch_LANES values of a stage, by its recurrences. */
 static void maxwell_bloch_foresee(const maxwell_bloch_memory *memory, maxwell_bloch_lanes weight[restrict][3],
     maxwell_bloch_lanes y[restrict 3])
 {
@@ -630,14 +641,39 @@ static double maxwell_bloch_correct(maxwell_bloch_lines *line)
     return isfinite(total) ? largest : HUGE_VAL;
 }
 
+/* Guesses where no recurrence is known: midpoints of steps by the classical Runge-Kutta method. */
+static void maxwell_bloch_march(const maxwell_bloch_solver *s, maxwell_bloch_lines line[1])
+{
+    static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
+    double x[3], point[3], slope[3], mean[3];
+    memcpy(x, s->x, sizeof x);
+    for (int k = 0; k < 1 * maxwell_bloch_LANES; ++k) {
+        const double h = maxwell_bloch_fractions[k % 1] * s->h;
+        memcpy(point, x, sizeof x);
+        memset(mean, 0, sizeof mean);
+        for (int part = 0; part < 4; ++part) {
+            maxwell_bloch_vector_field(&s->params, point, slope);
+            for (int i = 0; i < 3; ++i) {
+                mean[i] += weight[part] * slope[i];
+                point[i] = x[i] + h * reach[part] * slope[i];
+            }
+        }
+        for (int i = 0; i < 3; ++i) {
+            line[k % 1].y[i][k / 1] = x[i] + 0.5 * h * mean[i];
+            x[i] += h * mean[i];
+        }
+    }
+}
+
 /* maxwell_bloch_LANES steps at once: guess the points of all, and correct them together until the error that remains is as
-   small as after a single step. 0, and the solver as before, where that does not come about. */
-static int maxwell_bloch_block(maxwell_bloch_solver *s, maxwell_bloch_table *table)
+   small as after a single step. How many passes that took; 0, and the solver as before, where it takes more than most. */
+static int maxwell_bloch_block(maxwell_bloch_solver *s, maxwell_bloch_table *table, int most)
 {
     maxwell_bloch_lines line[1];
     double x[3], carry[3], value[3], previous = HUGE_VAL;
     int passes = 0, solved = 0;
-    for (int stage = 0; stage < 1; ++stage)
+    if (!s->foreseeing) maxwell_bloch_march(s, line);
+    for (int stage = 0; stage < 1 && s->foreseeing; ++stage)
         maxwell_bloch_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
     while (!solved) {
         double size = 0.0;
@@ -650,12 +686,11 @@ static int maxwell_bloch_block(maxwell_bloch_solver *s, maxwell_bloch_table *tab
         const double growth = size / (previous * previous);
         /* The second test: after the square of so small a correction there is rounding only. */
         solved = size * size * (growth > 1.0 ? growth : 1.0) <= 1e-20 || (previous < 1e-8 && size < 1e-10);
-        if (++passes == 4 || !(size < previous)) break;
+        if ((++passes >= most || !(size < previous)) && !solved) return 0;
         previous = size;
     }
     for (int i = 0; i < 3; ++i)
         if (!isfinite(x[i])) return 0;
-    if (!solved) return 0;
     memcpy(s->x, x, sizeof x);
     memcpy(s->carry, carry, sizeof carry);
     s->steps += maxwell_bloch_LANES;
@@ -666,52 +701,72 @@ static int maxwell_bloch_block(maxwell_bloch_solver *s, maxwell_bloch_table *tab
             maxwell_bloch_record(memory, value);
         }
         memory->slow = passes > 1 ? memory->slow + maxwell_bloch_LANES : 0;
-        if (memory->slow > memory->patience) maxwell_bloch_fit(memory);
+        if (memory->slow > memory->patience && s->foreseeing) maxwell_bloch_fit(memory);
     }
-    return 1;
+    return passes;
 }
 
-/* Whether a block may be tried: not before there are recurrences to guess with, and not for a while after one that
-   failed. They take a thousand steps to repay. */
-static int maxwell_bloch_may_block(maxwell_bloch_solver *s, double h, size_t steps)
+/* How the next block is guessed: by recurrences once they are fitted, which takes a thousand steps to repay. */
+static void maxwell_bloch_choose_guess(maxwell_bloch_solver *s, size_t steps)
 {
-    int fit = s->setback > 0 && s->steps - s->fitted >= 1000;
-    if (!s->ready || memcmp(&h, &s->h, sizeof h) != 0 || steps < maxwell_bloch_LANES) return 0;
-    if (s->pause > 0) {
-        --s->pause;
-        return 0;
-    }
-    for (int stage = 0; stage < 1; ++stage) {
-        fit = fit || s->memory[stage].fits == 0;
-        if (s->memory[stage].count < 96) return 0;
-    }
-    if (fit && steps < 1000) return 0;
-    for (int stage = 0; stage < 1 && fit; ++stage) maxwell_bloch_fit(&s->memory[stage]);
-    if (fit) s->fitted = s->steps;
-    return 1;
+    for (int stage = 0; stage < 1; ++stage)
+        if (s->memory[stage].count < 96) {
+            s->foreseeing = 0;
+            return;
+        }
+    if (s->foreseeing || steps < 1000 || s->steps < s->retry) return;
+    for (int stage = 0; stage < 1; ++stage) maxwell_bloch_fit(&s->memory[stage]);
+    s->foreseeing = 1;
+    s->pause = maxwell_bloch_LANES;
 }
 
-/* Blocks of steps where the motion can be foreseen, single steps elsewhere: the results differ by round-off only. */
+/* Learn from a block: recurrences that guess no better than steps by Runge-Kutta are given up for a while, and so are
+   blocks that fail with those. */
+static void maxwell_bloch_learn_from(maxwell_bloch_solver *s, int passes)
+{
+    if (s->foreseeing && (passes == 0 || (passes > 1 && passes >= s->passes))) {
+        s->foreseeing = 0;
+        s->doubt = 2 * s->doubt + 2000;
+        s->retry = s->steps + s->doubt;
+    } else if (passes == 0) {
+        s->setback = 2 * s->setback + maxwell_bloch_LANES > 1000 ? 1000 : 2 * s->setback + maxwell_bloch_LANES;
+        s->pause = s->setback;
+    } else {
+        s->setback /= 2;
+        if (!s->foreseeing) s->passes = passes;
+    }
+}
+
+/* A single step, and the running mean of the evaluations that a stage of one takes. */
+static maxwell_bloch_status maxwell_bloch_single(maxwell_bloch_solver *s)
+{
+    const size_t before = s->evaluations;
+    const maxwell_bloch_status status = maxwell_bloch_step(s, s->h);
+    s->effort += 0.125 * ((double)(s->evaluations - before) / 1 - s->effort);
+    return status;
+}
+
+/* Blocks of steps where they cost less than single steps, with at most as many passes over a block as 2 for each
+   evaluation in a single step. The results differ by round-off only. */
 maxwell_bloch_status maxwell_bloch_integrate(maxwell_bloch_solver *s, double h, size_t steps)
 {
     maxwell_bloch_table table;
+    maxwell_bloch_status status = maxwell_bloch_set_step(s, h);
     for (int stage = 0; stage < 1; ++stage) table.fits[stage] = -1;
-    while (steps > 0) {
-        if (s != NULL && maxwell_bloch_may_block(s, h, steps)) {
+    while (status == maxwell_bloch_OK && steps > 0) {
+        if (steps >= maxwell_bloch_LANES && s->pause == 0) maxwell_bloch_choose_guess(s, steps);
+        if (steps >= maxwell_bloch_LANES && s->pause == 0) {
             maxwell_bloch_tell(s, &table);
-            if (maxwell_bloch_block(s, &table)) {
-                steps -= maxwell_bloch_LANES;
-                s->setback /= 2;
-                continue;
-            }
-            s->setback = 2 * s->setback + maxwell_bloch_LANES > 1000 ? 1000 : 2 * s->setback + maxwell_bloch_LANES;
-            s->pause = s->setback;
+            const int passes = maxwell_bloch_block(s, &table, (int)(2 * s->effort + 0.5));
+            maxwell_bloch_learn_from(s, passes);
+            if (passes > 0) steps -= maxwell_bloch_LANES;
+        } else {
+            if (s->pause > 0) --s->pause;
+            status = maxwell_bloch_single(s);
+            if (status == maxwell_bloch_OK) --steps;
         }
-        const maxwell_bloch_status status = maxwell_bloch_step(s, h);
-        if (status != maxwell_bloch_OK) return status;
-        --steps;
     }
-    return maxwell_bloch_OK;
+    return status;
 }
 
 maxwell_bloch_status maxwell_bloch_ensemble(const maxwell_bloch_params *params, double *x, size_t members,

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: d50b90c5e9f262c34cf9e7686f2c0dc9ca62afb37354185d74b4f8a1899bedc8
+ * body-sha256: 76d86de6a33bdfdccfc4a50973b8b6b11110c3ee2c9d7fc01806f5e41d71dfe6
  */
 #include "nambu_pendulum.h"
 
@@ -453,17 +453,24 @@ nambu_pendulum_status nambu_pendulum_init(nambu_pendulum_solver *s, const nambu_
     return nambu_pendulum_OK;
 }
 
-nambu_pendulum_status nambu_pendulum_step(nambu_pendulum_solver *s, double h)
+/* What depends on the step size; nothing where that is as before. */
+static nambu_pendulum_status nambu_pendulum_set_step(nambu_pendulum_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return nambu_pendulum_BAD_ARGUMENT;
-    if (!s->ready || memcmp(&h, &s->h, sizeof h) != 0) {
-        for (int stage = 0; stage < 1; ++stage)
-            nambu_pendulum_prepare(&s->params, nambu_pendulum_fractions[stage] * h, s->coef[stage]);
-        memset(s->memory, 0, sizeof s->memory);
-        s->h = h;
-        s->ready = 1;
-    }
-    const nambu_pendulum_status status = nambu_pendulum_stages(s);
+    if (s->ready && memcmp(&h, &s->h, sizeof h) == 0) return nambu_pendulum_OK;
+    for (int stage = 0; stage < 1; ++stage)
+        nambu_pendulum_prepare(&s->params, nambu_pendulum_fractions[stage] * h, s->coef[stage]);
+    memset(s->memory, 0, sizeof s->memory);
+    s->h = h;
+    s->ready = 1;
+    return nambu_pendulum_OK;
+}
+
+nambu_pendulum_status nambu_pendulum_step(nambu_pendulum_solver *s, double h)
+{
+    nambu_pendulum_status status = nambu_pendulum_set_step(s, h);
+    if (status != nambu_pendulum_OK) return status;
+    status = nambu_pendulum_stages(s);
     if (status == nambu_pendulum_OK) ++s->steps;
     return status;
 }

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: aa2572ee7eb39182b59de4e9942f9e1e973792972bd6211f6c355ee4341d17a5
+ * body-sha256: b45b40af8ca87ca27c6bb2867079e9af93064ea60909974c340d8a14711d5020
  */
 #include "pendulum.h"
 
@@ -368,17 +368,28 @@ pendulum_status pendulum_init(pendulum_solver *s, const pendulum_params *params,
     return pendulum_OK;
 }
 
-pendulum_status pendulum_step(pendulum_solver *s, double h)
+/* What depends on the step size; nothing where that is as before. */
+static pendulum_status pendulum_set_step(pendulum_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return pendulum_BAD_ARGUMENT;
-    if (!s->ready || memcmp(&h, &s->h, sizeof h) != 0) {
-        for (int stage = 0; stage < 1; ++stage)
-            pendulum_prepare(&s->params, pendulum_fractions[stage] * h, s->coef[stage]);
-        memset(s->memory, 0, sizeof s->memory);
-        s->h = h;
-        s->ready = 1;
-    }
-    const pendulum_status status = pendulum_stages(s);
+    if (s->ready && memcmp(&h, &s->h, sizeof h) == 0) return pendulum_OK;
+    for (int stage = 0; stage < 1; ++stage)
+        pendulum_prepare(&s->params, pendulum_fractions[stage] * h, s->coef[stage]);
+    memset(s->memory, 0, sizeof s->memory);
+    s->pause = 16;
+    s->setback = s->foreseeing = 0;
+    s->doubt = s->retry = 0;
+    s->effort = 0.0;
+    s->h = h;
+    s->ready = 1;
+    return pendulum_OK;
+}
+
+pendulum_status pendulum_step(pendulum_solver *s, double h)
+{
+    pendulum_status status = pendulum_set_step(s, h);
+    if (status != pendulum_OK) return status;
+    status = pendulum_stages(s);
     if (status == pendulum_OK) ++s->steps;
     return status;
 }
@@ -555,7 +566,7 @@ static void pendulum_tell(const pendulum_solver *s, pendulum_table *table)
     }
 }
 
-/* The guesses for the next pendulum_LANES values. */
+/* Guesses for the next pendulum_LANES values of a stage, by its recurrences. */
 static void pendulum_foresee(const pendulum_memory *memory, pendulum_lanes weight[restrict][2],
     pendulum_lanes y[restrict 2])
 {
@@ -595,14 +606,39 @@ static double pendulum_correct(pendulum_lines *line)
     return isfinite(total) ? largest : HUGE_VAL;
 }
 
+/* Guesses where no recurrence is known: midpoints of steps by the classical Runge-Kutta method. */
+static void pendulum_march(const pendulum_solver *s, pendulum_lines line[1])
+{
+    static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
+    double x[2], point[2], slope[2], mean[2];
+    memcpy(x, s->x, sizeof x);
+    for (int k = 0; k < 1 * pendulum_LANES; ++k) {
+        const double h = pendulum_fractions[k % 1] * s->h;
+        memcpy(point, x, sizeof x);
+        memset(mean, 0, sizeof mean);
+        for (int part = 0; part < 4; ++part) {
+            pendulum_vector_field(&s->params, point, slope);
+            for (int i = 0; i < 2; ++i) {
+                mean[i] += weight[part] * slope[i];
+                point[i] = x[i] + h * reach[part] * slope[i];
+            }
+        }
+        for (int i = 0; i < 2; ++i) {
+            line[k % 1].y[i][k / 1] = x[i] + 0.5 * h * mean[i];
+            x[i] += h * mean[i];
+        }
+    }
+}
+
 /* pendulum_LANES steps at once: guess the points of all, and correct them together until the error that remains is as
-   small as after a single step. 0, and the solver as before, where that does not come about. */
-static int pendulum_block(pendulum_solver *s, pendulum_table *table)
+   small as after a single step. How many passes that took; 0, and the solver as before, where it takes more than most. */
+static int pendulum_block(pendulum_solver *s, pendulum_table *table, int most)
 {
     pendulum_lines line[1];
     double x[2], carry[2], value[2], previous = HUGE_VAL;
     int passes = 0, solved = 0;
-    for (int stage = 0; stage < 1; ++stage)
+    if (!s->foreseeing) pendulum_march(s, line);
+    for (int stage = 0; stage < 1 && s->foreseeing; ++stage)
         pendulum_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
     while (!solved) {
         double size = 0.0;
@@ -615,12 +651,11 @@ static int pendulum_block(pendulum_solver *s, pendulum_table *table)
         const double growth = size / (previous * previous);
         /* The second test: after the square of so small a correction there is rounding only. */
         solved = size * size * (growth > 1.0 ? growth : 1.0) <= 1e-20 || (previous < 1e-8 && size < 1e-10);
-        if (++passes == 4 || !(size < previous)) break;
+        if ((++passes >= most || !(size < previous)) && !solved) return 0;
         previous = size;
     }
     for (int i = 0; i < 2; ++i)
         if (!isfinite(x[i])) return 0;
-    if (!solved) return 0;
     memcpy(s->x, x, sizeof x);
     memcpy(s->carry, carry, sizeof carry);
     s->steps += pendulum_LANES;
@@ -631,52 +666,72 @@ static int pendulum_block(pendulum_solver *s, pendulum_table *table)
             pendulum_record(memory, value);
         }
         memory->slow = passes > 1 ? memory->slow + pendulum_LANES : 0;
-        if (memory->slow > memory->patience) pendulum_fit(memory);
+        if (memory->slow > memory->patience && s->foreseeing) pendulum_fit(memory);
     }
-    return 1;
+    return passes;
 }
 
-/* Whether a block may be tried: not before there are recurrences to guess with, and not for a while after one that
-   failed. They take a thousand steps to repay. */
-static int pendulum_may_block(pendulum_solver *s, double h, size_t steps)
+/* How the next block is guessed: by recurrences once they are fitted, which takes a thousand steps to repay. */
+static void pendulum_choose_guess(pendulum_solver *s, size_t steps)
 {
-    int fit = s->setback > 0 && s->steps - s->fitted >= 1000;
-    if (!s->ready || memcmp(&h, &s->h, sizeof h) != 0 || steps < pendulum_LANES) return 0;
-    if (s->pause > 0) {
-        --s->pause;
-        return 0;
-    }
-    for (int stage = 0; stage < 1; ++stage) {
-        fit = fit || s->memory[stage].fits == 0;
-        if (s->memory[stage].count < 96) return 0;
-    }
-    if (fit && steps < 1000) return 0;
-    for (int stage = 0; stage < 1 && fit; ++stage) pendulum_fit(&s->memory[stage]);
-    if (fit) s->fitted = s->steps;
-    return 1;
+    for (int stage = 0; stage < 1; ++stage)
+        if (s->memory[stage].count < 96) {
+            s->foreseeing = 0;
+            return;
+        }
+    if (s->foreseeing || steps < 1000 || s->steps < s->retry) return;
+    for (int stage = 0; stage < 1; ++stage) pendulum_fit(&s->memory[stage]);
+    s->foreseeing = 1;
+    s->pause = pendulum_LANES;
 }
 
-/* Blocks of steps where the motion can be foreseen, single steps elsewhere: the results differ by round-off only. */
+/* Learn from a block: recurrences that guess no better than steps by Runge-Kutta are given up for a while, and so are
+   blocks that fail with those. */
+static void pendulum_learn_from(pendulum_solver *s, int passes)
+{
+    if (s->foreseeing && (passes == 0 || (passes > 1 && passes >= s->passes))) {
+        s->foreseeing = 0;
+        s->doubt = 2 * s->doubt + 2000;
+        s->retry = s->steps + s->doubt;
+    } else if (passes == 0) {
+        s->setback = 2 * s->setback + pendulum_LANES > 1000 ? 1000 : 2 * s->setback + pendulum_LANES;
+        s->pause = s->setback;
+    } else {
+        s->setback /= 2;
+        if (!s->foreseeing) s->passes = passes;
+    }
+}
+
+/* A single step, and the running mean of the evaluations that a stage of one takes. */
+static pendulum_status pendulum_single(pendulum_solver *s)
+{
+    const size_t before = s->evaluations;
+    const pendulum_status status = pendulum_step(s, s->h);
+    s->effort += 0.125 * ((double)(s->evaluations - before) / 1 - s->effort);
+    return status;
+}
+
+/* Blocks of steps where they cost less than single steps, with at most as many passes over a block as 1 for each
+   evaluation in a single step. The results differ by round-off only. */
 pendulum_status pendulum_integrate(pendulum_solver *s, double h, size_t steps)
 {
     pendulum_table table;
+    pendulum_status status = pendulum_set_step(s, h);
     for (int stage = 0; stage < 1; ++stage) table.fits[stage] = -1;
-    while (steps > 0) {
-        if (s != NULL && pendulum_may_block(s, h, steps)) {
+    while (status == pendulum_OK && steps > 0) {
+        if (steps >= pendulum_LANES && s->pause == 0) pendulum_choose_guess(s, steps);
+        if (steps >= pendulum_LANES && s->pause == 0) {
             pendulum_tell(s, &table);
-            if (pendulum_block(s, &table)) {
-                steps -= pendulum_LANES;
-                s->setback /= 2;
-                continue;
-            }
-            s->setback = 2 * s->setback + pendulum_LANES > 1000 ? 1000 : 2 * s->setback + pendulum_LANES;
-            s->pause = s->setback;
+            const int passes = pendulum_block(s, &table, (int)(1 * s->effort + 0.5));
+            pendulum_learn_from(s, passes);
+            if (passes > 0) steps -= pendulum_LANES;
+        } else {
+            if (s->pause > 0) --s->pause;
+            status = pendulum_single(s);
+            if (status == pendulum_OK) --steps;
         }
-        const pendulum_status status = pendulum_step(s, h);
-        if (status != pendulum_OK) return status;
-        --steps;
     }
-    return pendulum_OK;
+    return status;
 }
 
 pendulum_status pendulum_ensemble(const pendulum_params *params, double *x, size_t members, double h,

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 0088f6826a0b3456ea51d591ddaa983e14146d3f8462903d28cea8646c341c35
+ * body-sha256: faae130268b7b6343c78709d10a447c36b3dd27bb7bd61c7b6e3bd49ac790cde
  */
 #ifndef PENDULUM_H
 #define PENDULUM_H
@@ -67,9 +67,13 @@ typedef struct {
     pendulum_params params;
     double h;  /* the step size that coef belongs to */
     int ready; /* whether coef has been computed */
-    int pause;   /* steps to make singly before a block is tried */
-    int setback; /* the last pause, halved with every block that succeeds */
-    size_t fitted; /* steps when recurrences were last fitted for blocks */
+    double effort;  /* evaluations that a single step takes, for each stage */
+    int pause;      /* steps to make singly before a block is tried */
+    int setback;    /* the last pause, halved with every block that succeeds */
+    int foreseeing; /* whether blocks are guessed by recurrences */
+    int passes;     /* that the last block took which was not */
+    size_t doubt;   /* steps to wait before recurrences are tried again */
+    size_t retry;   /* steps after which that is */
     double coef[1][19]; /* what depends on params and h only, for each stage */
     pendulum_memory memory[1];
 } pendulum_solver;

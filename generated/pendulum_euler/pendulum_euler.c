@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 773c7c71b91b01e99d4810698ec85c3a30c29a712b757857c7e9f555b812c7fa
+ * body-sha256: cef05f81d4d8e5c4b58bcd927df9612d448fd0adc12d54208e6604a63784f8a0
  */
 #include "pendulum_euler.h"
 
@@ -107,17 +107,24 @@ pendulum_euler_status pendulum_euler_init(pendulum_euler_solver *s, const pendul
     return pendulum_euler_OK;
 }
 
-pendulum_euler_status pendulum_euler_step(pendulum_euler_solver *s, double h)
+/* What depends on the step size; nothing where that is as before. */
+static pendulum_euler_status pendulum_euler_set_step(pendulum_euler_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return pendulum_euler_BAD_ARGUMENT;
-    if (!s->ready || memcmp(&h, &s->h, sizeof h) != 0) {
-        for (int stage = 0; stage < 1; ++stage)
-            pendulum_euler_prepare(&s->params, pendulum_euler_fractions[stage] * h, s->coef[stage]);
-        memset(s->memory, 0, sizeof s->memory);
-        s->h = h;
-        s->ready = 1;
-    }
-    const pendulum_euler_status status = pendulum_euler_stages(s);
+    if (s->ready && memcmp(&h, &s->h, sizeof h) == 0) return pendulum_euler_OK;
+    for (int stage = 0; stage < 1; ++stage)
+        pendulum_euler_prepare(&s->params, pendulum_euler_fractions[stage] * h, s->coef[stage]);
+    memset(s->memory, 0, sizeof s->memory);
+    s->h = h;
+    s->ready = 1;
+    return pendulum_euler_OK;
+}
+
+pendulum_euler_status pendulum_euler_step(pendulum_euler_solver *s, double h)
+{
+    pendulum_euler_status status = pendulum_euler_set_step(s, h);
+    if (status != pendulum_euler_OK) return status;
+    status = pendulum_euler_stages(s);
     if (status == pendulum_euler_OK) ++s->steps;
     return status;
 }

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: e19d0cc1be13c5f2b6742644d93413361df32b77fd664bdb68c7bc8ec243334b
+ * body-sha256: b08143bb8bfc6209ce3a6124179136d2311618eaf1f1627eab6fd1730bb1d075
  */
 #include "poisson_not_hamiltonian.h"
 
@@ -473,17 +473,28 @@ poisson_not_hamiltonian_status poisson_not_hamiltonian_init(poisson_not_hamilton
     return poisson_not_hamiltonian_OK;
 }
 
-poisson_not_hamiltonian_status poisson_not_hamiltonian_step(poisson_not_hamiltonian_solver *s, double h)
+/* What depends on the step size; nothing where that is as before. */
+static poisson_not_hamiltonian_status poisson_not_hamiltonian_set_step(poisson_not_hamiltonian_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return poisson_not_hamiltonian_BAD_ARGUMENT;
-    if (!s->ready || memcmp(&h, &s->h, sizeof h) != 0) {
-        for (int stage = 0; stage < 1; ++stage)
-            poisson_not_hamiltonian_prepare(&s->params, poisson_not_hamiltonian_fractions[stage] * h, s->coef[stage]);
-        memset(s->memory, 0, sizeof s->memory);
-        s->h = h;
-        s->ready = 1;
-    }
-    const poisson_not_hamiltonian_status status = poisson_not_hamiltonian_stages(s);
+    if (s->ready && memcmp(&h, &s->h, sizeof h) == 0) return poisson_not_hamiltonian_OK;
+    for (int stage = 0; stage < 1; ++stage)
+        poisson_not_hamiltonian_prepare(&s->params, poisson_not_hamiltonian_fractions[stage] * h, s->coef[stage]);
+    memset(s->memory, 0, sizeof s->memory);
+    s->pause = 16;
+    s->setback = s->foreseeing = 0;
+    s->doubt = s->retry = 0;
+    s->effort = 0.0;
+    s->h = h;
+    s->ready = 1;
+    return poisson_not_hamiltonian_OK;
+}
+
+poisson_not_hamiltonian_status poisson_not_hamiltonian_step(poisson_not_hamiltonian_solver *s, double h)
+{
+    poisson_not_hamiltonian_status status = poisson_not_hamiltonian_set_step(s, h);
+    if (status != poisson_not_hamiltonian_OK) return status;
+    status = poisson_not_hamiltonian_stages(s);
     if (status == poisson_not_hamiltonian_OK) ++s->steps;
     return status;
 }
@@ -833,7 +844,7 @@ static void poisson_not_hamiltonian_tell(const poisson_not_hamiltonian_solver *s
     }
 }
 
-/* The guesses for the next poisson_not_hamiltonian_LANES values. */
+/* Guesses for the next poisson_not_hamiltonian_LANES values of a stage, by its recurrences. */
 static void poisson_not_hamiltonian_foresee(const poisson_not_hamiltonian_memory *memory, poisson_not_hamiltonian_lanes weight[restrict][3],
     poisson_not_hamiltonian_lanes y[restrict 3])
 {
@@ -873,14 +884,39 @@ static double poisson_not_hamiltonian_correct(poisson_not_hamiltonian_lines *lin
     return isfinite(total) ? largest : HUGE_VAL;
 }
 
+/* Guesses where no recurrence is known: midpoints of steps by the classical Runge-Kutta method. */
+static void poisson_not_hamiltonian_march(const poisson_not_hamiltonian_solver *s, poisson_not_hamiltonian_lines line[1])
+{
+    static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
+    double x[3], point[3], slope[3], mean[3];
+    memcpy(x, s->x, sizeof x);
+    for (int k = 0; k < 1 * poisson_not_hamiltonian_LANES; ++k) {
+        const double h = poisson_not_hamiltonian_fractions[k % 1] * s->h;
+        memcpy(point, x, sizeof x);
+        memset(mean, 0, sizeof mean);
+        for (int part = 0; part < 4; ++part) {
+            poisson_not_hamiltonian_vector_field(&s->params, point, slope);
+            for (int i = 0; i < 3; ++i) {
+                mean[i] += weight[part] * slope[i];
+                point[i] = x[i] + h * reach[part] * slope[i];
+            }
+        }
+        for (int i = 0; i < 3; ++i) {
+            line[k % 1].y[i][k / 1] = x[i] + 0.5 * h * mean[i];
+            x[i] += h * mean[i];
+        }
+    }
+}
+
 /* poisson_not_hamiltonian_LANES steps at once: guess the points of all, and correct them together until the error that remains is as
-   small as after a single step. 0, and the solver as before, where that does not come about. */
-static int poisson_not_hamiltonian_block(poisson_not_hamiltonian_solver *s, poisson_not_hamiltonian_table *table)
+   small as after a single step. How many passes that took; 0, and the solver as before, where it takes more than most. */
+static int poisson_not_hamiltonian_block(poisson_not_hamiltonian_solver *s, poisson_not_hamiltonian_table *table, int most)
 {
     poisson_not_hamiltonian_lines line[1];
     double x[3], carry[3], value[3], previous = HUGE_VAL;
     int passes = 0, solved = 0;
-    for (int stage = 0; stage < 1; ++stage)
+    if (!s->foreseeing) poisson_not_hamiltonian_march(s, line);
+    for (int stage = 0; stage < 1 && s->foreseeing; ++stage)
         poisson_not_hamiltonian_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
     while (!solved) {
         double size = 0.0;
@@ -893,12 +929,11 @@ static int poisson_not_hamiltonian_block(poisson_not_hamiltonian_solver *s, pois
         const double growth = size / (previous * previous);
         /* The second test: after the square of so small a correction there is rounding only. */
         solved = size * size * (growth > 1.0 ? growth : 1.0) <= 1e-20 || (previous < 1e-8 && size < 1e-10);
-        if (++passes == 4 || !(size < previous)) break;
+        if ((++passes >= most || !(size < previous)) && !solved) return 0;
         previous = size;
     }
     for (int i = 0; i < 3; ++i)
         if (!isfinite(x[i])) return 0;
-    if (!solved) return 0;
     memcpy(s->x, x, sizeof x);
     memcpy(s->carry, carry, sizeof carry);
     s->steps += poisson_not_hamiltonian_LANES;
@@ -909,52 +944,72 @@ static int poisson_not_hamiltonian_block(poisson_not_hamiltonian_solver *s, pois
             poisson_not_hamiltonian_record(memory, value);
         }
         memory->slow = passes > 1 ? memory->slow + poisson_not_hamiltonian_LANES : 0;
-        if (memory->slow > memory->patience) poisson_not_hamiltonian_fit(memory);
+        if (memory->slow > memory->patience && s->foreseeing) poisson_not_hamiltonian_fit(memory);
     }
-    return 1;
+    return passes;
 }
 
-/* Whether a block may be tried: not before there are recurrences to guess with, and not for a while after one that
-   failed. They take a thousand steps to repay. */
-static int poisson_not_hamiltonian_may_block(poisson_not_hamiltonian_solver *s, double h, size_t steps)
+/* How the next block is guessed: by recurrences once they are fitted, which takes a thousand steps to repay. */
+static void poisson_not_hamiltonian_choose_guess(poisson_not_hamiltonian_solver *s, size_t steps)
 {
-    int fit = s->setback > 0 && s->steps - s->fitted >= 1000;
-    if (!s->ready || memcmp(&h, &s->h, sizeof h) != 0 || steps < poisson_not_hamiltonian_LANES) return 0;
-    if (s->pause > 0) {
-        --s->pause;
-        return 0;
-    }
-    for (int stage = 0; stage < 1; ++stage) {
-        fit = fit || s->memory[stage].fits == 0;
-        if (s->memory[stage].count < 96) return 0;
-    }
-    if (fit && steps < 1000) return 0;
-    for (int stage = 0; stage < 1 && fit; ++stage) poisson_not_hamiltonian_fit(&s->memory[stage]);
-    if (fit) s->fitted = s->steps;
-    return 1;
+    for (int stage = 0; stage < 1; ++stage)
+        if (s->memory[stage].count < 96) {
+            s->foreseeing = 0;
+            return;
+        }
+    if (s->foreseeing || steps < 1000 || s->steps < s->retry) return;
+    for (int stage = 0; stage < 1; ++stage) poisson_not_hamiltonian_fit(&s->memory[stage]);
+    s->foreseeing = 1;
+    s->pause = poisson_not_hamiltonian_LANES;
 }
 
-/* Blocks of steps where the motion can be foreseen, single steps elsewhere: the results differ by round-off only. */
+/* Learn from a block: recurrences that guess no better than steps by Runge-Kutta are given up for a while, and so are
+   blocks that fail with those. */
+static void poisson_not_hamiltonian_learn_from(poisson_not_hamiltonian_solver *s, int passes)
+{
+    if (s->foreseeing && (passes == 0 || (passes > 1 && passes >= s->passes))) {
+        s->foreseeing = 0;
+        s->doubt = 2 * s->doubt + 2000;
+        s->retry = s->steps + s->doubt;
+    } else if (passes == 0) {
+        s->setback = 2 * s->setback + poisson_not_hamiltonian_LANES > 1000 ? 1000 : 2 * s->setback + poisson_not_hamiltonian_LANES;
+        s->pause = s->setback;
+    } else {
+        s->setback /= 2;
+        if (!s->foreseeing) s->passes = passes;
+    }
+}
+
+/* A single step, and the running mean of the evaluations that a stage of one takes. */
+static poisson_not_hamiltonian_status poisson_not_hamiltonian_single(poisson_not_hamiltonian_solver *s)
+{
+    const size_t before = s->evaluations;
+    const poisson_not_hamiltonian_status status = poisson_not_hamiltonian_step(s, s->h);
+    s->effort += 0.125 * ((double)(s->evaluations - before) / 1 - s->effort);
+    return status;
+}
+
+/* Blocks of steps where they cost less than single steps, with at most as many passes over a block as 1 for each
+   evaluation in a single step. The results differ by round-off only. */
 poisson_not_hamiltonian_status poisson_not_hamiltonian_integrate(poisson_not_hamiltonian_solver *s, double h, size_t steps)
 {
     poisson_not_hamiltonian_table table;
+    poisson_not_hamiltonian_status status = poisson_not_hamiltonian_set_step(s, h);
     for (int stage = 0; stage < 1; ++stage) table.fits[stage] = -1;
-    while (steps > 0) {
-        if (s != NULL && poisson_not_hamiltonian_may_block(s, h, steps)) {
+    while (status == poisson_not_hamiltonian_OK && steps > 0) {
+        if (steps >= poisson_not_hamiltonian_LANES && s->pause == 0) poisson_not_hamiltonian_choose_guess(s, steps);
+        if (steps >= poisson_not_hamiltonian_LANES && s->pause == 0) {
             poisson_not_hamiltonian_tell(s, &table);
-            if (poisson_not_hamiltonian_block(s, &table)) {
-                steps -= poisson_not_hamiltonian_LANES;
-                s->setback /= 2;
-                continue;
-            }
-            s->setback = 2 * s->setback + poisson_not_hamiltonian_LANES > 1000 ? 1000 : 2 * s->setback + poisson_not_hamiltonian_LANES;
-            s->pause = s->setback;
+            const int passes = poisson_not_hamiltonian_block(s, &table, (int)(1 * s->effort + 0.5));
+            poisson_not_hamiltonian_learn_from(s, passes);
+            if (passes > 0) steps -= poisson_not_hamiltonian_LANES;
+        } else {
+            if (s->pause > 0) --s->pause;
+            status = poisson_not_hamiltonian_single(s);
+            if (status == poisson_not_hamiltonian_OK) --steps;
         }
-        const poisson_not_hamiltonian_status status = poisson_not_hamiltonian_step(s, h);
-        if (status != poisson_not_hamiltonian_OK) return status;
-        --steps;
     }
-    return poisson_not_hamiltonian_OK;
+    return status;
 }
 
 poisson_not_hamiltonian_status poisson_not_hamiltonian_ensemble(const poisson_not_hamiltonian_params *params,

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: cb9b78bd0abaa7baac95c43fe134f32be0bb0fa27730090bb893acde0865995d
+ * body-sha256: 22ade35d5f1dde19c70abfd51ebb610fa3cef46feefa4256e2b681b5fe5dc758
  */
 #ifndef POISSON_NOT_HAMILTONIAN_H
 #define POISSON_NOT_HAMILTONIAN_H
@@ -67,9 +67,13 @@ typedef struct {
     poisson_not_hamiltonian_params params;
     double h;  /* the step size that coef belongs to */
     int ready; /* whether coef has been computed */
-    int pause;   /* steps to make singly before a block is tried */
-    int setback; /* the last pause, halved with every block that succeeds */
-    size_t fitted; /* steps when recurrences were last fitted for blocks */
+    double effort;  /* evaluations that a single step takes, for each stage */
+    int pause;      /* steps to make singly before a block is tried */
+    int setback;    /* the last pause, halved with every block that succeeds */
+    int foreseeing; /* whether blocks are guessed by recurrences */
+    int passes;     /* that the last block took which was not */
+    size_t doubt;   /* steps to wait before recurrences are tried again */
+    size_t retry;   /* steps after which that is */
     double coef[1][2]; /* what depends on params and h only, for each stage */
     poisson_not_hamiltonian_memory memory[1];
 } poisson_not_hamiltonian_solver;

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 66a448c3e235b8ba5987642c1382e71504c1e0c5ddafdbb6072d9f0ef6c470f4
+ * body-sha256: 9b424c0d1c01f72963f5ab59c1f17ea8df493fa54d35fe2d049afb761296398d
  */
 #include "predator_prey.h"
 
@@ -369,17 +369,28 @@ predator_prey_status predator_prey_init(predator_prey_solver *s, const predator_
     return predator_prey_OK;
 }
 
-predator_prey_status predator_prey_step(predator_prey_solver *s, double h)
+/* What depends on the step size; nothing where that is as before. */
+static predator_prey_status predator_prey_set_step(predator_prey_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return predator_prey_BAD_ARGUMENT;
-    if (!s->ready || memcmp(&h, &s->h, sizeof h) != 0) {
-        for (int stage = 0; stage < 1; ++stage)
-            predator_prey_prepare(&s->params, predator_prey_fractions[stage] * h, s->coef[stage]);
-        memset(s->memory, 0, sizeof s->memory);
-        s->h = h;
-        s->ready = 1;
-    }
-    const predator_prey_status status = predator_prey_stages(s);
+    if (s->ready && memcmp(&h, &s->h, sizeof h) == 0) return predator_prey_OK;
+    for (int stage = 0; stage < 1; ++stage)
+        predator_prey_prepare(&s->params, predator_prey_fractions[stage] * h, s->coef[stage]);
+    memset(s->memory, 0, sizeof s->memory);
+    s->pause = 16;
+    s->setback = s->foreseeing = 0;
+    s->doubt = s->retry = 0;
+    s->effort = 0.0;
+    s->h = h;
+    s->ready = 1;
+    return predator_prey_OK;
+}
+
+predator_prey_status predator_prey_step(predator_prey_solver *s, double h)
+{
+    predator_prey_status status = predator_prey_set_step(s, h);
+    if (status != predator_prey_OK) return status;
+    status = predator_prey_stages(s);
     if (status == predator_prey_OK) ++s->steps;
     return status;
 }
@@ -601,7 +612,7 @@ static void predator_prey_tell(const predator_prey_solver *s, predator_prey_tabl
     }
 }
 
-/* The guesses for the next predator_prey_LANES values. */
+/* Guesses for the next predator_prey_LANES values of a stage, by its recurrences. */
 static void predator_prey_foresee(const predator_prey_memory *memory, predator_prey_lanes weight[restrict][2],
     predator_prey_lanes y[restrict 2])
 {
@@ -641,14 +652,39 @@ static double predator_prey_correct(predator_prey_lines *line)
     return isfinite(total) ? largest : HUGE_VAL;
 }
 
+/* Guesses where no recurrence is known: midpoints of steps by the classical Runge-Kutta method. */
+static void predator_prey_march(const predator_prey_solver *s, predator_prey_lines line[1])
+{
+    static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
+    double x[2], point[2], slope[2], mean[2];
+    memcpy(x, s->x, sizeof x);
+    for (int k = 0; k < 1 * predator_prey_LANES; ++k) {
+        const double h = predator_prey_fractions[k % 1] * s->h;
+        memcpy(point, x, sizeof x);
+        memset(mean, 0, sizeof mean);
+        for (int part = 0; part < 4; ++part) {
+            predator_prey_vector_field(&s->params, point, slope);
+            for (int i = 0; i < 2; ++i) {
+                mean[i] += weight[part] * slope[i];
+                point[i] = x[i] + h * reach[part] * slope[i];
+            }
+        }
+        for (int i = 0; i < 2; ++i) {
+            line[k % 1].y[i][k / 1] = x[i] + 0.5 * h * mean[i];
+            x[i] += h * mean[i];
+        }
+    }
+}
+
 /* predator_prey_LANES steps at once: guess the points of all, and correct them together until the error that remains is as
-   small as after a single step. 0, and the solver as before, where that does not come about. */
-static int predator_prey_block(predator_prey_solver *s, predator_prey_table *table)
+   small as after a single step. How many passes that took; 0, and the solver as before, where it takes more than most. */
+static int predator_prey_block(predator_prey_solver *s, predator_prey_table *table, int most)
 {
     predator_prey_lines line[1];
     double x[2], carry[2], value[2], previous = HUGE_VAL;
     int passes = 0, solved = 0;
-    for (int stage = 0; stage < 1; ++stage)
+    if (!s->foreseeing) predator_prey_march(s, line);
+    for (int stage = 0; stage < 1 && s->foreseeing; ++stage)
         predator_prey_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
     while (!solved) {
         double size = 0.0;
@@ -661,12 +697,11 @@ static int predator_prey_block(predator_prey_solver *s, predator_prey_table *tab
         const double growth = size / (previous * previous);
         /* The second test: after the square of so small a correction there is rounding only. */
         solved = size * size * (growth > 1.0 ? growth : 1.0) <= 1e-20 || (previous < 1e-8 && size < 1e-10);
-        if (++passes == 4 || !(size < previous)) break;
+        if ((++passes >= most || !(size < previous)) && !solved) return 0;
         previous = size;
     }
     for (int i = 0; i < 2; ++i)
         if (!isfinite(x[i])) return 0;
-    if (!solved) return 0;
     memcpy(s->x, x, sizeof x);
     memcpy(s->carry, carry, sizeof carry);
     s->steps += predator_prey_LANES;
@@ -677,52 +712,72 @@ static int predator_prey_block(predator_prey_solver *s, predator_prey_table *tab
             predator_prey_record(memory, value);
         }
         memory->slow = passes > 1 ? memory->slow + predator_prey_LANES : 0;
-        if (memory->slow > memory->patience) predator_prey_fit(memory);
+        if (memory->slow > memory->patience && s->foreseeing) predator_prey_fit(memory);
     }
-    return 1;
+    return passes;
 }
 
-/* Whether a block may be tried: not before there are recurrences to guess with, and not for a while after one that
-   failed. They take a thousand steps to repay. */
-static int predator_prey_may_block(predator_prey_solver *s, double h, size_t steps)
+/* How the next block is guessed: by recurrences once they are fitted, which takes a thousand steps to repay. */
+static void predator_prey_choose_guess(predator_prey_solver *s, size_t steps)
 {
-    int fit = s->setback > 0 && s->steps - s->fitted >= 1000;
-    if (!s->ready || memcmp(&h, &s->h, sizeof h) != 0 || steps < predator_prey_LANES) return 0;
-    if (s->pause > 0) {
-        --s->pause;
-        return 0;
-    }
-    for (int stage = 0; stage < 1; ++stage) {
-        fit = fit || s->memory[stage].fits == 0;
-        if (s->memory[stage].count < 96) return 0;
-    }
-    if (fit && steps < 1000) return 0;
-    for (int stage = 0; stage < 1 && fit; ++stage) predator_prey_fit(&s->memory[stage]);
-    if (fit) s->fitted = s->steps;
-    return 1;
+    for (int stage = 0; stage < 1; ++stage)
+        if (s->memory[stage].count < 96) {
+            s->foreseeing = 0;
+            return;
+        }
+    if (s->foreseeing || steps < 1000 || s->steps < s->retry) return;
+    for (int stage = 0; stage < 1; ++stage) predator_prey_fit(&s->memory[stage]);
+    s->foreseeing = 1;
+    s->pause = predator_prey_LANES;
 }
 
-/* Blocks of steps where the motion can be foreseen, single steps elsewhere: the results differ by round-off only. */
+/* Learn from a block: recurrences that guess no better than steps by Runge-Kutta are given up for a while, and so are
+   blocks that fail with those. */
+static void predator_prey_learn_from(predator_prey_solver *s, int passes)
+{
+    if (s->foreseeing && (passes == 0 || (passes > 1 && passes >= s->passes))) {
+        s->foreseeing = 0;
+        s->doubt = 2 * s->doubt + 2000;
+        s->retry = s->steps + s->doubt;
+    } else if (passes == 0) {
+        s->setback = 2 * s->setback + predator_prey_LANES > 1000 ? 1000 : 2 * s->setback + predator_prey_LANES;
+        s->pause = s->setback;
+    } else {
+        s->setback /= 2;
+        if (!s->foreseeing) s->passes = passes;
+    }
+}
+
+/* A single step, and the running mean of the evaluations that a stage of one takes. */
+static predator_prey_status predator_prey_single(predator_prey_solver *s)
+{
+    const size_t before = s->evaluations;
+    const predator_prey_status status = predator_prey_step(s, s->h);
+    s->effort += 0.125 * ((double)(s->evaluations - before) / 1 - s->effort);
+    return status;
+}
+
+/* Blocks of steps where they cost less than single steps, with at most as many passes over a block as 2 for each
+   evaluation in a single step. The results differ by round-off only. */
 predator_prey_status predator_prey_integrate(predator_prey_solver *s, double h, size_t steps)
 {
     predator_prey_table table;
+    predator_prey_status status = predator_prey_set_step(s, h);
     for (int stage = 0; stage < 1; ++stage) table.fits[stage] = -1;
-    while (steps > 0) {
-        if (s != NULL && predator_prey_may_block(s, h, steps)) {
+    while (status == predator_prey_OK && steps > 0) {
+        if (steps >= predator_prey_LANES && s->pause == 0) predator_prey_choose_guess(s, steps);
+        if (steps >= predator_prey_LANES && s->pause == 0) {
             predator_prey_tell(s, &table);
-            if (predator_prey_block(s, &table)) {
-                steps -= predator_prey_LANES;
-                s->setback /= 2;
-                continue;
-            }
-            s->setback = 2 * s->setback + predator_prey_LANES > 1000 ? 1000 : 2 * s->setback + predator_prey_LANES;
-            s->pause = s->setback;
+            const int passes = predator_prey_block(s, &table, (int)(2 * s->effort + 0.5));
+            predator_prey_learn_from(s, passes);
+            if (passes > 0) steps -= predator_prey_LANES;
+        } else {
+            if (s->pause > 0) --s->pause;
+            status = predator_prey_single(s);
+            if (status == predator_prey_OK) --steps;
         }
-        const predator_prey_status status = predator_prey_step(s, h);
-        if (status != predator_prey_OK) return status;
-        --steps;
     }
-    return predator_prey_OK;
+    return status;
 }
 
 predator_prey_status predator_prey_ensemble(const predator_prey_params *params, double *x, size_t members,

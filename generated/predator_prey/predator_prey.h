@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 427b13cbfaa5152ad178e6b65cc22be6529a7bf71c61cda4948dca2b2b1af096
+ * body-sha256: 850fce6dd145e78c614f6847351302e2479040baf2bdbc2196fcca3f30a05a35
  */
 #ifndef PREDATOR_PREY_H
 #define PREDATOR_PREY_H
@@ -70,9 +70,13 @@ typedef struct {
     predator_prey_params params;
     double h;  /* the step size that coef belongs to */
     int ready; /* whether coef has been computed */
-    int pause;   /* steps to make singly before a block is tried */
-    int setback; /* the last pause, halved with every block that succeeds */
-    size_t fitted; /* steps when recurrences were last fitted for blocks */
+    double effort;  /* evaluations that a single step takes, for each stage */
+    int pause;      /* steps to make singly before a block is tried */
+    int setback;    /* the last pause, halved with every block that succeeds */
+    int foreseeing; /* whether blocks are guessed by recurrences */
+    int passes;     /* that the last block took which was not */
+    size_t doubt;   /* steps to wait before recurrences are tried again */
+    size_t retry;   /* steps after which that is */
     double coef[1][11]; /* what depends on params and h only, for each stage */
     predator_prey_memory memory[1];
 } predator_prey_solver;

@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: ce99c261040086c787b36da4c78d12bb1a4d69edafdf374fb5fec06a949fb799
+ * body-sha256: fca53ebb18f5f1201ae0da0f769b53768900353fce164c0d4bfcf6a0076d6b57
  */
 #ifndef RIGID_BODY_H
 #define RIGID_BODY_H
@@ -71,9 +71,13 @@ typedef struct {
     double gauge[1]; /* multiples of C taken from H */
     double h;  /* the step size that coef belongs to */
     int ready; /* whether coef has been computed */
-    int pause;   /* steps to make singly before a block is tried */
-    int setback; /* the last pause, halved with every block that succeeds */
-    size_t fitted; /* steps when recurrences were last fitted for blocks */
+    double effort;  /* evaluations that a single step takes, for each stage */
+    int pause;      /* steps to make singly before a block is tried */
+    int setback;    /* the last pause, halved with every block that succeeds */
+    int foreseeing; /* whether blocks are guessed by recurrences */
+    int passes;     /* that the last block took which was not */
+    size_t doubt;   /* steps to wait before recurrences are tried again */
+    size_t retry;   /* steps after which that is */
     double coef[1][35]; /* what depends on params and h only, for each stage */
     rigid_body_memory memory[1];
 } rigid_body_solver;

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: cecad72a05de778bd7a1354bab1672e70fa0664129fcbbc9299b48bceccec8b5
+ * body-sha256: 6820702103c9ae5281d5e500007929c0eae4f831912f36b61fcfaecbac439610
  */
 #include "rigid_body_paper.h"
 
@@ -479,17 +479,28 @@ rigid_body_paper_status rigid_body_paper_init(rigid_body_paper_solver *s,
     return rigid_body_paper_OK;
 }
 
-rigid_body_paper_status rigid_body_paper_step(rigid_body_paper_solver *s, double h)
+/* What depends on the step size; nothing where that is as before. */
+static rigid_body_paper_status rigid_body_paper_set_step(rigid_body_paper_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return rigid_body_paper_BAD_ARGUMENT;
-    if (!s->ready || memcmp(&h, &s->h, sizeof h) != 0) {
-        for (int stage = 0; stage < 1; ++stage)
-            rigid_body_paper_prepare(&s->params, rigid_body_paper_fractions[stage] * h, s->coef[stage]);
-        memset(s->memory, 0, sizeof s->memory);
-        s->h = h;
-        s->ready = 1;
-    }
-    const rigid_body_paper_status status = rigid_body_paper_stages(s);
+    if (s->ready && memcmp(&h, &s->h, sizeof h) == 0) return rigid_body_paper_OK;
+    for (int stage = 0; stage < 1; ++stage)
+        rigid_body_paper_prepare(&s->params, rigid_body_paper_fractions[stage] * h, s->coef[stage]);
+    memset(s->memory, 0, sizeof s->memory);
+    s->pause = 16;
+    s->setback = s->foreseeing = 0;
+    s->doubt = s->retry = 0;
+    s->effort = 0.0;
+    s->h = h;
+    s->ready = 1;
+    return rigid_body_paper_OK;
+}
+
+rigid_body_paper_status rigid_body_paper_step(rigid_body_paper_solver *s, double h)
+{
+    rigid_body_paper_status status = rigid_body_paper_set_step(s, h);
+    if (status != rigid_body_paper_OK) return status;
+    status = rigid_body_paper_stages(s);
     if (status == rigid_body_paper_OK) ++s->steps;
     return status;
 }
@@ -774,7 +785,7 @@ static void rigid_body_paper_tell(const rigid_body_paper_solver *s, rigid_body_p
     }
 }
 
-/* The guesses for the next rigid_body_paper_LANES values. */
+/* Guesses for the next rigid_body_paper_LANES values of a stage, by its recurrences. */
 static void rigid_body_paper_foresee(const rigid_body_paper_memory *memory, rigid_body_paper_lanes weight[restrict][3],
     rigid_body_paper_lanes y[restrict 3])
 {
@@ -814,14 +825,39 @@ static double rigid_body_paper_correct(rigid_body_paper_lines *line)
     return isfinite(total) ? largest : HUGE_VAL;
 }
 
+/* Guesses where no recurrence is known: midpoints of steps by the classical Runge-Kutta method. */
+static void rigid_body_paper_march(const rigid_body_paper_solver *s, rigid_body_paper_lines line[1])
+{
+    static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
+    double x[3], point[3], slope[3], mean[3];
+    memcpy(x, s->x, sizeof x);
+    for (int k = 0; k < 1 * rigid_body_paper_LANES; ++k) {
+        const double h = rigid_body_paper_fractions[k % 1] * s->h;
+        memcpy(point, x, sizeof x);
+        memset(mean, 0, sizeof mean);
+        for (int part = 0; part < 4; ++part) {
+            rigid_body_paper_vector_field(&s->params, point, slope);
+            for (int i = 0; i < 3; ++i) {
+                mean[i] += weight[part] * slope[i];
+                point[i] = x[i] + h * reach[part] * slope[i];
+            }
+        }
+        for (int i = 0; i < 3; ++i) {
+            line[k % 1].y[i][k / 1] = x[i] + 0.5 * h * mean[i];
+            x[i] += h * mean[i];
+        }
+    }
+}
+
 /* rigid_body_paper_LANES steps at once: guess the points of all, and correct them together until the error that remains is as
-   small as after a single step. 0, and the solver as before, where that does not come about. */
-static int rigid_body_paper_block(rigid_body_paper_solver *s, rigid_body_paper_table *table)
+   small as after a single step. How many passes that took; 0, and the solver as before, where it takes more than most. */
+static int rigid_body_paper_block(rigid_body_paper_solver *s, rigid_body_paper_table *table, int most)
 {
     rigid_body_paper_lines line[1];
     double x[3], carry[3], value[3], previous = HUGE_VAL;
     int passes = 0, solved = 0;
-    for (int stage = 0; stage < 1; ++stage)
+    if (!s->foreseeing) rigid_body_paper_march(s, line);
+    for (int stage = 0; stage < 1 && s->foreseeing; ++stage)
         rigid_body_paper_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
     while (!solved) {
         double size = 0.0;
@@ -834,12 +870,11 @@ static int rigid_body_paper_block(rigid_body_paper_solver *s, rigid_body_paper_t
         const double growth = size / (previous * previous);
         /* The second test: after the square of so small a correction there is rounding only. */
         solved = size * size * (growth > 1.0 ? growth : 1.0) <= 1e-20 || (previous < 1e-8 && size < 1e-10);
-        if (++passes == 4 || !(size < previous)) break;
+        if ((++passes >= most || !(size < previous)) && !solved) return 0;
         previous = size;
     }
     for (int i = 0; i < 3; ++i)
         if (!isfinite(x[i])) return 0;
-    if (!solved) return 0;
     memcpy(s->x, x, sizeof x);
     memcpy(s->carry, carry, sizeof carry);
     s->steps += rigid_body_paper_LANES;
@@ -850,52 +885,72 @@ static int rigid_body_paper_block(rigid_body_paper_solver *s, rigid_body_paper_t
             rigid_body_paper_record(memory, value);
         }
         memory->slow = passes > 1 ? memory->slow + rigid_body_paper_LANES : 0;
-        if (memory->slow > memory->patience) rigid_body_paper_fit(memory);
+        if (memory->slow > memory->patience && s->foreseeing) rigid_body_paper_fit(memory);
     }
-    return 1;
+    return passes;
 }
 
-/* Whether a block may be tried: not before there are recurrences to guess with, and not for a while after one that
-   failed. They take a thousand steps to repay. */
-static int rigid_body_paper_may_block(rigid_body_paper_solver *s, double h, size_t steps)
+/* How the next block is guessed: by recurrences once they are fitted, which takes a thousand steps to repay. */
+static void rigid_body_paper_choose_guess(rigid_body_paper_solver *s, size_t steps)
 {
-    int fit = s->setback > 0 && s->steps - s->fitted >= 1000;
-    if (!s->ready || memcmp(&h, &s->h, sizeof h) != 0 || steps < rigid_body_paper_LANES) return 0;
-    if (s->pause > 0) {
-        --s->pause;
-        return 0;
-    }
-    for (int stage = 0; stage < 1; ++stage) {
-        fit = fit || s->memory[stage].fits == 0;
-        if (s->memory[stage].count < 96) return 0;
-    }
-    if (fit && steps < 1000) return 0;
-    for (int stage = 0; stage < 1 && fit; ++stage) rigid_body_paper_fit(&s->memory[stage]);
-    if (fit) s->fitted = s->steps;
-    return 1;
+    for (int stage = 0; stage < 1; ++stage)
+        if (s->memory[stage].count < 96) {
+            s->foreseeing = 0;
+            return;
+        }
+    if (s->foreseeing || steps < 1000 || s->steps < s->retry) return;
+    for (int stage = 0; stage < 1; ++stage) rigid_body_paper_fit(&s->memory[stage]);
+    s->foreseeing = 1;
+    s->pause = rigid_body_paper_LANES;
 }
 
-/* Blocks of steps where the motion can be foreseen, single steps elsewhere: the results differ by round-off only. */
+/* Learn from a block: recurrences that guess no better than steps by Runge-Kutta are given up for a while, and so are
+   blocks that fail with those. */
+static void rigid_body_paper_learn_from(rigid_body_paper_solver *s, int passes)
+{
+    if (s->foreseeing && (passes == 0 || (passes > 1 && passes >= s->passes))) {
+        s->foreseeing = 0;
+        s->doubt = 2 * s->doubt + 2000;
+        s->retry = s->steps + s->doubt;
+    } else if (passes == 0) {
+        s->setback = 2 * s->setback + rigid_body_paper_LANES > 1000 ? 1000 : 2 * s->setback + rigid_body_paper_LANES;
+        s->pause = s->setback;
+    } else {
+        s->setback /= 2;
+        if (!s->foreseeing) s->passes = passes;
+    }
+}
+
+/* A single step, and the running mean of the evaluations that a stage of one takes. */
+static rigid_body_paper_status rigid_body_paper_single(rigid_body_paper_solver *s)
+{
+    const size_t before = s->evaluations;
+    const rigid_body_paper_status status = rigid_body_paper_step(s, s->h);
+    s->effort += 0.125 * ((double)(s->evaluations - before) / 1 - s->effort);
+    return status;
+}
+
+/* Blocks of steps where they cost less than single steps, with at most as many passes over a block as 2 for each
+   evaluation in a single step. The results differ by round-off only. */
 rigid_body_paper_status rigid_body_paper_integrate(rigid_body_paper_solver *s, double h, size_t steps)
 {
     rigid_body_paper_table table;
+    rigid_body_paper_status status = rigid_body_paper_set_step(s, h);
     for (int stage = 0; stage < 1; ++stage) table.fits[stage] = -1;
-    while (steps > 0) {
-        if (s != NULL && rigid_body_paper_may_block(s, h, steps)) {
+    while (status == rigid_body_paper_OK && steps > 0) {
+        if (steps >= rigid_body_paper_LANES && s->pause == 0) rigid_body_paper_choose_guess(s, steps);
+        if (steps >= rigid_body_paper_LANES && s->pause == 0) {
             rigid_body_paper_tell(s, &table);
-            if (rigid_body_paper_block(s, &table)) {
-                steps -= rigid_body_paper_LANES;
-                s->setback /= 2;
-                continue;
-            }
-            s->setback = 2 * s->setback + rigid_body_paper_LANES > 1000 ? 1000 : 2 * s->setback + rigid_body_paper_LANES;
-            s->pause = s->setback;
+            const int passes = rigid_body_paper_block(s, &table, (int)(2 * s->effort + 0.5));
+            rigid_body_paper_learn_from(s, passes);
+            if (passes > 0) steps -= rigid_body_paper_LANES;
+        } else {
+            if (s->pause > 0) --s->pause;
+            status = rigid_body_paper_single(s);
+            if (status == rigid_body_paper_OK) --steps;
         }
-        const rigid_body_paper_status status = rigid_body_paper_step(s, h);
-        if (status != rigid_body_paper_OK) return status;
-        --steps;
     }
-    return rigid_body_paper_OK;
+    return status;
 }
 
 rigid_body_paper_status rigid_body_paper_ensemble(const rigid_body_paper_params *params, double *x,

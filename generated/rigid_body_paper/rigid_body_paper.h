@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 781711ba1a4e04a45ca1b6dc391e3f01972a82cdde24bd00efb57a2904a89ce3
+ * body-sha256: 01fadbf09eb23eff8c4f7ab4cd9a865d84994a2e392149cc986b769b09ba97dc
  */
 #ifndef RIGID_BODY_PAPER_H
 #define RIGID_BODY_PAPER_H
@@ -69,9 +69,13 @@ typedef struct {
     rigid_body_paper_params params;
     double h;  /* the step size that coef belongs to */
     int ready; /* whether coef has been computed */
-    int pause;   /* steps to make singly before a block is tried */
-    int setback; /* the last pause, halved with every block that succeeds */
-    size_t fitted; /* steps when recurrences were last fitted for blocks */
+    double effort;  /* evaluations that a single step takes, for each stage */
+    int pause;      /* steps to make singly before a block is tried */
+    int setback;    /* the last pause, halved with every block that succeeds */
+    int foreseeing; /* whether blocks are guessed by recurrences */
+    int passes;     /* that the last block took which was not */
+    size_t doubt;   /* steps to wait before recurrences are tried again */
+    size_t retry;   /* steps after which that is */
     double coef[1][3]; /* what depends on params and h only, for each stage */
     rigid_body_paper_memory memory[1];
 } rigid_body_paper_solver;

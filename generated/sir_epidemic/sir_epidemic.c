@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 00eb5d2c820fb63dc99ac255e4bce396fb70e52e8b16b6c77755258326fbda44
+ * body-sha256: 0f0591f930a33afa26e3b4afa4ed1548108c0c6ac44f9e566a441eb237fe06ab
  */
 #include "sir_epidemic.h"
 
@@ -453,17 +453,24 @@ sir_epidemic_status sir_epidemic_init(sir_epidemic_solver *s, const sir_epidemic
     return sir_epidemic_OK;
 }
 
-sir_epidemic_status sir_epidemic_step(sir_epidemic_solver *s, double h)
+/* What depends on the step size; nothing where that is as before. */
+static sir_epidemic_status sir_epidemic_set_step(sir_epidemic_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return sir_epidemic_BAD_ARGUMENT;
-    if (!s->ready || memcmp(&h, &s->h, sizeof h) != 0) {
-        for (int stage = 0; stage < 1; ++stage)
-            sir_epidemic_prepare(&s->params, sir_epidemic_fractions[stage] * h, s->coef[stage]);
-        memset(s->memory, 0, sizeof s->memory);
-        s->h = h;
-        s->ready = 1;
-    }
-    const sir_epidemic_status status = sir_epidemic_stages(s);
+    if (s->ready && memcmp(&h, &s->h, sizeof h) == 0) return sir_epidemic_OK;
+    for (int stage = 0; stage < 1; ++stage)
+        sir_epidemic_prepare(&s->params, sir_epidemic_fractions[stage] * h, s->coef[stage]);
+    memset(s->memory, 0, sizeof s->memory);
+    s->h = h;
+    s->ready = 1;
+    return sir_epidemic_OK;
+}
+
+sir_epidemic_status sir_epidemic_step(sir_epidemic_solver *s, double h)
+{
+    sir_epidemic_status status = sir_epidemic_set_step(s, h);
+    if (status != sir_epidemic_OK) return status;
+    status = sir_epidemic_stages(s);
     if (status == sir_epidemic_OK) ++s->steps;
     return status;
 }

@@ -12,7 +12,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: f6c2cc0e6fe5a0141089deb618619569f14dd3cdb59c9c34ab7680e5556b5634
+ * body-sha256: a376d2128d6beda516787a102c4d07fa068db797101046212fc9d6a1046c21af
  */
 #include "sir_final_size.h"
 
@@ -455,17 +455,24 @@ sir_final_size_status sir_final_size_init(sir_final_size_solver *s, const sir_fi
     return sir_final_size_OK;
 }
 
-sir_final_size_status sir_final_size_step(sir_final_size_solver *s, double h)
+/* What depends on the step size; nothing where that is as before. */
+static sir_final_size_status sir_final_size_set_step(sir_final_size_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return sir_final_size_BAD_ARGUMENT;
-    if (!s->ready || memcmp(&h, &s->h, sizeof h) != 0) {
-        for (int stage = 0; stage < 1; ++stage)
-            sir_final_size_prepare(&s->params, sir_final_size_fractions[stage] * h, s->coef[stage]);
-        memset(s->memory, 0, sizeof s->memory);
-        s->h = h;
-        s->ready = 1;
-    }
-    const sir_final_size_status status = sir_final_size_stages(s);
+    if (s->ready && memcmp(&h, &s->h, sizeof h) == 0) return sir_final_size_OK;
+    for (int stage = 0; stage < 1; ++stage)
+        sir_final_size_prepare(&s->params, sir_final_size_fractions[stage] * h, s->coef[stage]);
+    memset(s->memory, 0, sizeof s->memory);
+    s->h = h;
+    s->ready = 1;
+    return sir_final_size_OK;
+}
+
+sir_final_size_status sir_final_size_step(sir_final_size_solver *s, double h)
+{
+    sir_final_size_status status = sir_final_size_set_step(s, h);
+    if (status != sir_final_size_OK) return status;
+    status = sir_final_size_stages(s);
     if (status == sir_final_size_OK) ++s->steps;
     return status;
 }

@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 26b88f26356de509713ad8fe505e77b1ac4978c8a51a9623f28fb350b95412e5
+ * body-sha256: 169e43e5d33534e30d0dc891c70375258048e58485e88aef33e2ede7a911cf1e
  */
 #include "sklyanin_gyrostat.h"
 
@@ -777,17 +777,24 @@ sklyanin_gyrostat_status sklyanin_gyrostat_init(sklyanin_gyrostat_solver *s,
     return sklyanin_gyrostat_OK;
 }
 
-sklyanin_gyrostat_status sklyanin_gyrostat_step(sklyanin_gyrostat_solver *s, double h)
+/* What depends on the step size; nothing where that is as before. */
+static sklyanin_gyrostat_status sklyanin_gyrostat_set_step(sklyanin_gyrostat_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return sklyanin_gyrostat_BAD_ARGUMENT;
-    if (!s->ready || memcmp(&h, &s->h, sizeof h) != 0) {
-        for (int stage = 0; stage < 1; ++stage)
-            sklyanin_gyrostat_prepare(&s->params, s->gauge, sklyanin_gyrostat_fractions[stage] * h, s->coef[stage]);
-        memset(s->memory, 0, sizeof s->memory);
-        s->h = h;
-        s->ready = 1;
-    }
-    const sklyanin_gyrostat_status status = sklyanin_gyrostat_stages(s);
+    if (s->ready && memcmp(&h, &s->h, sizeof h) == 0) return sklyanin_gyrostat_OK;
+    for (int stage = 0; stage < 1; ++stage)
+        sklyanin_gyrostat_prepare(&s->params, s->gauge, sklyanin_gyrostat_fractions[stage] * h, s->coef[stage]);
+    memset(s->memory, 0, sizeof s->memory);
+    s->h = h;
+    s->ready = 1;
+    return sklyanin_gyrostat_OK;
+}
+
+sklyanin_gyrostat_status sklyanin_gyrostat_step(sklyanin_gyrostat_solver *s, double h)
+{
+    sklyanin_gyrostat_status status = sklyanin_gyrostat_set_step(s, h);
+    if (status != sklyanin_gyrostat_OK) return status;
+    status = sklyanin_gyrostat_stages(s);
     if (status == sklyanin_gyrostat_OK) ++s->steps;
     return status;
 }

@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 77319fbe8a635d39496cb192fecdf8b58887c50e61497b8a6117b3cdf0f62a75
+ * body-sha256: c64451a8d629ab4c25c306734d3865c464608f48375a0685ac66426a6cf102d9
  */
 #include "so4_manakov.h"
 
@@ -1092,17 +1092,28 @@ so4_manakov_status so4_manakov_init(so4_manakov_solver *s, const so4_manakov_par
     return so4_manakov_OK;
 }
 
-so4_manakov_status so4_manakov_step(so4_manakov_solver *s, double h)
+/* What depends on the step size; nothing where that is as before. */
+static so4_manakov_status so4_manakov_set_step(so4_manakov_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return so4_manakov_BAD_ARGUMENT;
-    if (!s->ready || memcmp(&h, &s->h, sizeof h) != 0) {
-        for (int stage = 0; stage < 1; ++stage)
-            so4_manakov_prepare(&s->params, s->gauge, so4_manakov_fractions[stage] * h, s->coef[stage]);
-        memset(s->memory, 0, sizeof s->memory);
-        s->h = h;
-        s->ready = 1;
-    }
-    const so4_manakov_status status = so4_manakov_stages(s);
+    if (s->ready && memcmp(&h, &s->h, sizeof h) == 0) return so4_manakov_OK;
+    for (int stage = 0; stage < 1; ++stage)
+        so4_manakov_prepare(&s->params, s->gauge, so4_manakov_fractions[stage] * h, s->coef[stage]);
+    memset(s->memory, 0, sizeof s->memory);
+    s->pause = 16;
+    s->setback = s->foreseeing = 0;
+    s->doubt = s->retry = 0;
+    s->effort = 0.0;
+    s->h = h;
+    s->ready = 1;
+    return so4_manakov_OK;
+}
+
+so4_manakov_status so4_manakov_step(so4_manakov_solver *s, double h)
+{
+    so4_manakov_status status = so4_manakov_set_step(s, h);
+    if (status != so4_manakov_OK) return status;
+    status = so4_manakov_stages(s);
     if (status == so4_manakov_OK) ++s->steps;
     return status;
 }
@@ -1822,7 +1833,7 @@ static void so4_manakov_tell(const so4_manakov_solver *s, so4_manakov_table *tab
     }
 }
 
-/* The guesses for the next so4_manakov_LANES values. */
+/* Guesses for the next so4_manakov_LANES values of a stage, by its recurrences. */
 static void so4_manakov_foresee(const so4_manakov_memory *memory, so4_manakov_lanes weight[restrict][6],
     so4_manakov_lanes y[restrict 6])
 {
@@ -1862,14 +1873,39 @@ static double so4_manakov_correct(so4_manakov_lines *line)
     return isfinite(total) ? largest : HUGE_VAL;
 }
 
+/* Guesses where no recurrence is known: midpoints of steps by the classical Runge-Kutta method. */
+static void so4_manakov_march(const so4_manakov_solver *s, so4_manakov_lines line[1])
+{
+    static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
+    double x[6], point[6], slope[6], mean[6];
+    memcpy(x, s->x, sizeof x);
+    for (int k = 0; k < 1 * so4_manakov_LANES; ++k) {
+        const double h = so4_manakov_fractions[k % 1] * s->h;
+        memcpy(point, x, sizeof x);
+        memset(mean, 0, sizeof mean);
+        for (int part = 0; part < 4; ++part) {
+            so4_manakov_vector_field(&s->params, point, slope);
+            for (int i = 0; i < 6; ++i) {
+                mean[i] += weight[part] * slope[i];
+                point[i] = x[i] + h * reach[part] * slope[i];
+            }
+        }
+        for (int i = 0; i < 6; ++i) {
+            line[k % 1].y[i][k / 1] = x[i] + 0.5 * h * mean[i];
+            x[i] += h * mean[i];
+        }
+    }
+}
+
 /* so4_manakov_LANES steps at once: guess the points of all, and correct them together until the error that remains is as
-   small as after a single step. 0, and the solver as before, where that does not come about. */
-static int so4_manakov_block(so4_manakov_solver *s, so4_manakov_table *table)
+   small as after a single step. How many passes that took; 0, and the solver as before, where it takes more than most. */
+static int so4_manakov_block(so4_manakov_solver *s, so4_manakov_table *table, int most)
 {
     so4_manakov_lines line[1];
     double x[6], carry[6], value[6], previous = HUGE_VAL;
     int passes = 0, solved = 0;
-    for (int stage = 0; stage < 1; ++stage)
+    if (!s->foreseeing) so4_manakov_march(s, line);
+    for (int stage = 0; stage < 1 && s->foreseeing; ++stage)
         so4_manakov_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
     while (!solved) {
         double size = 0.0;
@@ -1882,12 +1918,11 @@ static int so4_manakov_block(so4_manakov_solver *s, so4_manakov_table *table)
         const double growth = size / (previous * previous);
         /* The second test: after the square of so small a correction there is rounding only. */
         solved = size * size * (growth > 1.0 ? growth : 1.0) <= 1e-20 || (previous < 1e-8 && size < 1e-10);
-        if (++passes == 4 || !(size < previous)) break;
+        if ((++passes >= most || !(size < previous)) && !solved) return 0;
         previous = size;
     }
     for (int i = 0; i < 6; ++i)
         if (!isfinite(x[i])) return 0;
-    if (!solved) return 0;
     memcpy(s->x, x, sizeof x);
     memcpy(s->carry, carry, sizeof carry);
     s->steps += so4_manakov_LANES;
@@ -1898,52 +1933,72 @@ static int so4_manakov_block(so4_manakov_solver *s, so4_manakov_table *table)
             so4_manakov_record(memory, value);
         }
         memory->slow = passes > 1 ? memory->slow + so4_manakov_LANES : 0;
-        if (memory->slow > memory->patience) so4_manakov_fit(memory);
+        if (memory->slow > memory->patience && s->foreseeing) so4_manakov_fit(memory);
     }
-    return 1;
+    return passes;
 }
 
-/* Whether a block may be tried: not before there are recurrences to guess with, and not for a while after one that
-   failed. They take a thousand steps to repay. */
-static int so4_manakov_may_block(so4_manakov_solver *s, double h, size_t steps)
+/* How the next block is guessed: by recurrences once they are fitted, which takes a thousand steps to repay. */
+static void so4_manakov_choose_guess(so4_manakov_solver *s, size_t steps)
 {
-    int fit = s->setback > 0 && s->steps - s->fitted >= 1000;
-    if (!s->ready || memcmp(&h, &s->h, sizeof h) != 0 || steps < so4_manakov_LANES) return 0;
-    if (s->pause > 0) {
-        --s->pause;
-        return 0;
-    }
-    for (int stage = 0; stage < 1; ++stage) {
-        fit = fit || s->memory[stage].fits == 0;
-        if (s->memory[stage].count < 96) return 0;
-    }
-    if (fit && steps < 1000) return 0;
-    for (int stage = 0; stage < 1 && fit; ++stage) so4_manakov_fit(&s->memory[stage]);
-    if (fit) s->fitted = s->steps;
-    return 1;
+    for (int stage = 0; stage < 1; ++stage)
+        if (s->memory[stage].count < 96) {
+            s->foreseeing = 0;
+            return;
+        }
+    if (s->foreseeing || steps < 1000 || s->steps < s->retry) return;
+    for (int stage = 0; stage < 1; ++stage) so4_manakov_fit(&s->memory[stage]);
+    s->foreseeing = 1;
+    s->pause = so4_manakov_LANES;
 }
 
-/* Blocks of steps where the motion can be foreseen, single steps elsewhere: the results differ by round-off only. */
+/* Learn from a block: recurrences that guess no better than steps by Runge-Kutta are given up for a while, and so are
+   blocks that fail with those. */
+static void so4_manakov_learn_from(so4_manakov_solver *s, int passes)
+{
+    if (s->foreseeing && (passes == 0 || (passes > 1 && passes >= s->passes))) {
+        s->foreseeing = 0;
+        s->doubt = 2 * s->doubt + 2000;
+        s->retry = s->steps + s->doubt;
+    } else if (passes == 0) {
+        s->setback = 2 * s->setback + so4_manakov_LANES > 1000 ? 1000 : 2 * s->setback + so4_manakov_LANES;
+        s->pause = s->setback;
+    } else {
+        s->setback /= 2;
+        if (!s->foreseeing) s->passes = passes;
+    }
+}
+
+/* A single step, and the running mean of the evaluations that a stage of one takes. */
+static so4_manakov_status so4_manakov_single(so4_manakov_solver *s)
+{
+    const size_t before = s->evaluations;
+    const so4_manakov_status status = so4_manakov_step(s, s->h);
+    s->effort += 0.125 * ((double)(s->evaluations - before) / 1 - s->effort);
+    return status;
+}
+
+/* Blocks of steps where they cost less than single steps, with at most as many passes over a block as 2 for each
+   evaluation in a single step. The results differ by round-off only. */
 so4_manakov_status so4_manakov_integrate(so4_manakov_solver *s, double h, size_t steps)
 {
     so4_manakov_table table;
+    so4_manakov_status status = so4_manakov_set_step(s, h);
     for (int stage = 0; stage < 1; ++stage) table.fits[stage] = -1;
-    while (steps > 0) {
-        if (s != NULL && so4_manakov_may_block(s, h, steps)) {
+    while (status == so4_manakov_OK && steps > 0) {
+        if (steps >= so4_manakov_LANES && s->pause == 0) so4_manakov_choose_guess(s, steps);
+        if (steps >= so4_manakov_LANES && s->pause == 0) {
             so4_manakov_tell(s, &table);
-            if (so4_manakov_block(s, &table)) {
-                steps -= so4_manakov_LANES;
-                s->setback /= 2;
-                continue;
-            }
-            s->setback = 2 * s->setback + so4_manakov_LANES > 1000 ? 1000 : 2 * s->setback + so4_manakov_LANES;
-            s->pause = s->setback;
+            const int passes = so4_manakov_block(s, &table, (int)(2 * s->effort + 0.5));
+            so4_manakov_learn_from(s, passes);
+            if (passes > 0) steps -= so4_manakov_LANES;
+        } else {
+            if (s->pause > 0) --s->pause;
+            status = so4_manakov_single(s);
+            if (status == so4_manakov_OK) --steps;
         }
-        const so4_manakov_status status = so4_manakov_step(s, h);
-        if (status != so4_manakov_OK) return status;
-        --steps;
     }
-    return so4_manakov_OK;
+    return status;
 }
 
 so4_manakov_status so4_manakov_ensemble(const so4_manakov_params *params, double *x, size_t members, double h,

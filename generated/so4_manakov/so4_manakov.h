@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 4a60bc5e8ed35302912515c433bb4976fff93b5d286f262d4d3ba5d41abc84e0
+ * body-sha256: a682de5e160318d5d368ee0226bf65aad000ab0fa8603ebdd595b04aa441d8e6
  */
 #ifndef SO4_MANAKOV_H
 #define SO4_MANAKOV_H
@@ -69,9 +69,13 @@ typedef struct {
     double gauge[1]; /* multiples of A taken from H */
     double h;  /* the step size that coef belongs to */
     int ready; /* whether coef has been computed */
-    int pause;   /* steps to make singly before a block is tried */
-    int setback; /* the last pause, halved with every block that succeeds */
-    size_t fitted; /* steps when recurrences were last fitted for blocks */
+    double effort;  /* evaluations that a single step takes, for each stage */
+    int pause;      /* steps to make singly before a block is tried */
+    int setback;    /* the last pause, halved with every block that succeeds */
+    int foreseeing; /* whether blocks are guessed by recurrences */
+    int passes;     /* that the last block took which was not */
+    size_t doubt;   /* steps to wait before recurrences are tried again */
+    size_t retry;   /* steps after which that is */
     double coef[1][32]; /* what depends on params and h only, for each stage */
     so4_manakov_memory memory[1];
 } so4_manakov_solver;

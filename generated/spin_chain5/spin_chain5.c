@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 5428580b6ebdd436d3790f1a45a0a769c59a82fd3ae6dfe1539e65f6dd34abd0
+ * body-sha256: ad72e49042091e95249a0fe31f3d58cad3c3a3e38c50d50ec456e72c3b065ff1
  */
 #include "spin_chain5.h"
 
@@ -2483,17 +2483,28 @@ spin_chain5_status spin_chain5_init(spin_chain5_solver *s, const spin_chain5_par
     return spin_chain5_OK;
 }
 
-spin_chain5_status spin_chain5_step(spin_chain5_solver *s, double h)
+/* What depends on the step size; nothing where that is as before. */
+static spin_chain5_status spin_chain5_set_step(spin_chain5_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return spin_chain5_BAD_ARGUMENT;
-    if (!s->ready || memcmp(&h, &s->h, sizeof h) != 0) {
-        for (int stage = 0; stage < 1; ++stage)
-            spin_chain5_prepare(&s->params, s->gauge, spin_chain5_fractions[stage] * h, s->coef[stage]);
-        memset(s->memory, 0, sizeof s->memory);
-        s->h = h;
-        s->ready = 1;
-    }
-    const spin_chain5_status status = spin_chain5_stages(s);
+    if (s->ready && memcmp(&h, &s->h, sizeof h) == 0) return spin_chain5_OK;
+    for (int stage = 0; stage < 1; ++stage)
+        spin_chain5_prepare(&s->params, s->gauge, spin_chain5_fractions[stage] * h, s->coef[stage]);
+    memset(s->memory, 0, sizeof s->memory);
+    s->pause = 16;
+    s->setback = s->foreseeing = 0;
+    s->doubt = s->retry = 0;
+    s->effort = 0.0;
+    s->h = h;
+    s->ready = 1;
+    return spin_chain5_OK;
+}
+
+spin_chain5_status spin_chain5_step(spin_chain5_solver *s, double h)
+{
+    spin_chain5_status status = spin_chain5_set_step(s, h);
+    if (status != spin_chain5_OK) return status;
+    status = spin_chain5_stages(s);
     if (status == spin_chain5_OK) ++s->steps;
     return status;
 }
@@ -4195,7 +4206,7 @@ static void spin_chain5_tell(const spin_chain5_solver *s, spin_chain5_table *tab
     }
 }
 
-/* The guesses for the next spin_chain5_LANES values. */
+/* Guesses for the next spin_chain5_LANES values of a stage, by its recurrences. */
 static void spin_chain5_foresee(const spin_chain5_memory *memory, spin_chain5_lanes weight[restrict][15],
     spin_chain5_lanes y[restrict 15])
 {
@@ -4235,14 +4246,39 @@ static double spin_chain5_correct(spin_chain5_lines *line)
     return isfinite(total) ? largest : HUGE_VAL;
 }
 
+/* Guesses where no recurrence is known: midpoints of steps by the classical Runge-Kutta method. */
+static void spin_chain5_march(const spin_chain5_solver *s, spin_chain5_lines line[1])
+{
+    static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
+    double x[15], point[15], slope[15], mean[15];
+    memcpy(x, s->x, sizeof x);
+    for (int k = 0; k < 1 * spin_chain5_LANES; ++k) {
+        const double h = spin_chain5_fractions[k % 1] * s->h;
+        memcpy(point, x, sizeof x);
+        memset(mean, 0, sizeof mean);
+        for (int part = 0; part < 4; ++part) {
+            spin_chain5_vector_field(&s->params, point, slope);
+            for (int i = 0; i < 15; ++i) {
+                mean[i] += weight[part] * slope[i];
+                point[i] = x[i] + h * reach[part] * slope[i];
+            }
+        }
+        for (int i = 0; i < 15; ++i) {
+            line[k % 1].y[i][k / 1] = x[i] + 0.5 * h * mean[i];
+            x[i] += h * mean[i];
+        }
+    }
+}
+
 /* spin_chain5_LANES steps at once: guess the points of all, and correct them together until the error that remains is as
-   small as after a single step. 0, and the solver as before, where that does not come about. */
-static int spin_chain5_block(spin_chain5_solver *s, spin_chain5_table *table)
+   small as after a single step. How many passes that took; 0, and the solver as before, where it takes more than most. */
+static int spin_chain5_block(spin_chain5_solver *s, spin_chain5_table *table, int most)
 {
     spin_chain5_lines line[1];
     double x[15], carry[15], value[15], previous = HUGE_VAL;
     int passes = 0, solved = 0;
-    for (int stage = 0; stage < 1; ++stage)
+    if (!s->foreseeing) spin_chain5_march(s, line);
+    for (int stage = 0; stage < 1 && s->foreseeing; ++stage)
         spin_chain5_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
     while (!solved) {
         double size = 0.0;
@@ -4255,12 +4291,11 @@ static int spin_chain5_block(spin_chain5_solver *s, spin_chain5_table *table)
         const double growth = size / (previous * previous);
         /* The second test: after the square of so small a correction there is rounding only. */
         solved = size * size * (growth > 1.0 ? growth : 1.0) <= 1e-20 || (previous < 1e-8 && size < 1e-10);
-        if (++passes == 4 || !(size < previous)) break;
+        if ((++passes >= most || !(size < previous)) && !solved) return 0;
         previous = size;
     }
     for (int i = 0; i < 15; ++i)
         if (!isfinite(x[i])) return 0;
-    if (!solved) return 0;
     memcpy(s->x, x, sizeof x);
     memcpy(s->carry, carry, sizeof carry);
     s->steps += spin_chain5_LANES;
@@ -4271,52 +4306,72 @@ static int spin_chain5_block(spin_chain5_solver *s, spin_chain5_table *table)
             spin_chain5_record(memory, value);
         }
         memory->slow = passes > 1 ? memory->slow + spin_chain5_LANES : 0;
-        if (memory->slow > memory->patience) spin_chain5_fit(memory);
+        if (memory->slow > memory->patience && s->foreseeing) spin_chain5_fit(memory);
     }
-    return 1;
+    return passes;
 }
 
-/* Whether a block may be tried: not before there are recurrences to guess with, and not for a while after one that
-   failed. They take a thousand steps to repay. */
-static int spin_chain5_may_block(spin_chain5_solver *s, double h, size_t steps)
+/* How the next block is guessed: by recurrences once they are fitted, which takes a thousand steps to repay. */
+static void spin_chain5_choose_guess(spin_chain5_solver *s, size_t steps)
 {
-    int fit = s->setback > 0 && s->steps - s->fitted >= 1000;
-    if (!s->ready || memcmp(&h, &s->h, sizeof h) != 0 || steps < spin_chain5_LANES) return 0;
-    if (s->pause > 0) {
-        --s->pause;
-        return 0;
-    }
-    for (int stage = 0; stage < 1; ++stage) {
-        fit = fit || s->memory[stage].fits == 0;
-        if (s->memory[stage].count < 96) return 0;
-    }
-    if (fit && steps < 1000) return 0;
-    for (int stage = 0; stage < 1 && fit; ++stage) spin_chain5_fit(&s->memory[stage]);
-    if (fit) s->fitted = s->steps;
-    return 1;
+    for (int stage = 0; stage < 1; ++stage)
+        if (s->memory[stage].count < 96) {
+            s->foreseeing = 0;
+            return;
+        }
+    if (s->foreseeing || steps < 1000 || s->steps < s->retry) return;
+    for (int stage = 0; stage < 1; ++stage) spin_chain5_fit(&s->memory[stage]);
+    s->foreseeing = 1;
+    s->pause = spin_chain5_LANES;
 }
 
-/* Blocks of steps where the motion can be foreseen, single steps elsewhere: the results differ by round-off only. */
+/* Learn from a block: recurrences that guess no better than steps by Runge-Kutta are given up for a while, and so are
+   blocks that fail with those. */
+static void spin_chain5_learn_from(spin_chain5_solver *s, int passes)
+{
+    if (s->foreseeing && (passes == 0 || (passes > 1 && passes >= s->passes))) {
+        s->foreseeing = 0;
+        s->doubt = 2 * s->doubt + 2000;
+        s->retry = s->steps + s->doubt;
+    } else if (passes == 0) {
+        s->setback = 2 * s->setback + spin_chain5_LANES > 1000 ? 1000 : 2 * s->setback + spin_chain5_LANES;
+        s->pause = s->setback;
+    } else {
+        s->setback /= 2;
+        if (!s->foreseeing) s->passes = passes;
+    }
+}
+
+/* A single step, and the running mean of the evaluations that a stage of one takes. */
+static spin_chain5_status spin_chain5_single(spin_chain5_solver *s)
+{
+    const size_t before = s->evaluations;
+    const spin_chain5_status status = spin_chain5_step(s, s->h);
+    s->effort += 0.125 * ((double)(s->evaluations - before) / 1 - s->effort);
+    return status;
+}
+
+/* Blocks of steps where they cost less than single steps, with at most as many passes over a block as 2 for each
+   evaluation in a single step. The results differ by round-off only. */
 spin_chain5_status spin_chain5_integrate(spin_chain5_solver *s, double h, size_t steps)
 {
     spin_chain5_table table;
+    spin_chain5_status status = spin_chain5_set_step(s, h);
     for (int stage = 0; stage < 1; ++stage) table.fits[stage] = -1;
-    while (steps > 0) {
-        if (s != NULL && spin_chain5_may_block(s, h, steps)) {
+    while (status == spin_chain5_OK && steps > 0) {
+        if (steps >= spin_chain5_LANES && s->pause == 0) spin_chain5_choose_guess(s, steps);
+        if (steps >= spin_chain5_LANES && s->pause == 0) {
             spin_chain5_tell(s, &table);
-            if (spin_chain5_block(s, &table)) {
-                steps -= spin_chain5_LANES;
-                s->setback /= 2;
-                continue;
-            }
-            s->setback = 2 * s->setback + spin_chain5_LANES > 1000 ? 1000 : 2 * s->setback + spin_chain5_LANES;
-            s->pause = s->setback;
+            const int passes = spin_chain5_block(s, &table, (int)(2 * s->effort + 0.5));
+            spin_chain5_learn_from(s, passes);
+            if (passes > 0) steps -= spin_chain5_LANES;
+        } else {
+            if (s->pause > 0) --s->pause;
+            status = spin_chain5_single(s);
+            if (status == spin_chain5_OK) --steps;
         }
-        const spin_chain5_status status = spin_chain5_step(s, h);
-        if (status != spin_chain5_OK) return status;
-        --steps;
     }
-    return spin_chain5_OK;
+    return status;
 }
 
 spin_chain5_status spin_chain5_ensemble(const spin_chain5_params *params, double *x, size_t members, double h,

@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 5fafe2f0146a95473667ad6b698b731b693f9b36a0607601f5a720d2a8e8181f
+ * body-sha256: 6cd1e97034c4c7c3565be0c965df546f3ac4eecfbff10e2049b02bdab5f80ee8
  */
 #ifndef SPIN_CHAIN5_H
 #define SPIN_CHAIN5_H
@@ -69,9 +69,13 @@ typedef struct {
     double gauge[5]; /* multiples of C1, C2, C3, C4, C5 taken from H */
     double h;  /* the step size that coef belongs to */
     int ready; /* whether coef has been computed */
-    int pause;   /* steps to make singly before a block is tried */
-    int setback; /* the last pause, halved with every block that succeeds */
-    size_t fitted; /* steps when recurrences were last fitted for blocks */
+    double effort;  /* evaluations that a single step takes, for each stage */
+    int pause;      /* steps to make singly before a block is tried */
+    int setback;    /* the last pause, halved with every block that succeeds */
+    int foreseeing; /* whether blocks are guessed by recurrences */
+    int passes;     /* that the last block took which was not */
+    size_t doubt;   /* steps to wait before recurrences are tried again */
+    size_t retry;   /* steps after which that is */
     double coef[1][33]; /* what depends on params and h only, for each stage */
     spin_chain5_memory memory[1];
 } spin_chain5_solver;

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 03afa633060164bb8aaaa651b8e703ce07c316f9ef230ee8ca0db91009d982cb
+ * body-sha256: eae8263db35988fa4e62e3d46f09aeb7b29a3caa8b906f6b6bf900eb82d6b125
  */
 #include "toda3.h"
 
@@ -553,17 +553,28 @@ toda3_status toda3_init(toda3_solver *s, const toda3_params *params, const doubl
     return toda3_OK;
 }
 
-toda3_status toda3_step(toda3_solver *s, double h)
+/* What depends on the step size; nothing where that is as before. */
+static toda3_status toda3_set_step(toda3_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return toda3_BAD_ARGUMENT;
-    if (!s->ready || memcmp(&h, &s->h, sizeof h) != 0) {
-        for (int stage = 0; stage < 1; ++stage)
-            toda3_prepare(&s->params, toda3_fractions[stage] * h, s->coef[stage]);
-        memset(s->memory, 0, sizeof s->memory);
-        s->h = h;
-        s->ready = 1;
-    }
-    const toda3_status status = toda3_stages(s);
+    if (s->ready && memcmp(&h, &s->h, sizeof h) == 0) return toda3_OK;
+    for (int stage = 0; stage < 1; ++stage)
+        toda3_prepare(&s->params, toda3_fractions[stage] * h, s->coef[stage]);
+    memset(s->memory, 0, sizeof s->memory);
+    s->pause = 16;
+    s->setback = s->foreseeing = 0;
+    s->doubt = s->retry = 0;
+    s->effort = 0.0;
+    s->h = h;
+    s->ready = 1;
+    return toda3_OK;
+}
+
+toda3_status toda3_step(toda3_solver *s, double h)
+{
+    toda3_status status = toda3_set_step(s, h);
+    if (status != toda3_OK) return status;
+    status = toda3_stages(s);
     if (status == toda3_OK) ++s->steps;
     return status;
 }
@@ -933,7 +944,7 @@ static void toda3_tell(const toda3_solver *s, toda3_table *table)
     }
 }
 
-/* The guesses for the next toda3_LANES values. */
+/* Guesses for the next toda3_LANES values of a stage, by its recurrences. */
 static void toda3_foresee(const toda3_memory *memory, toda3_lanes weight[restrict][5],
     toda3_lanes y[restrict 5])
 {
@@ -973,14 +984,39 @@ static double toda3_correct(toda3_lines *line)
     return isfinite(total) ? largest : HUGE_VAL;
 }
 
+/* Guesses where no recurrence is known: midpoints of steps by the classical Runge-Kutta method. */
+static void toda3_march(const toda3_solver *s, toda3_lines line[1])
+{
+    static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
+    double x[5], point[5], slope[5], mean[5];
+    memcpy(x, s->x, sizeof x);
+    for (int k = 0; k < 1 * toda3_LANES; ++k) {
+        const double h = toda3_fractions[k % 1] * s->h;
+        memcpy(point, x, sizeof x);
+        memset(mean, 0, sizeof mean);
+        for (int part = 0; part < 4; ++part) {
+            toda3_vector_field(&s->params, point, slope);
+            for (int i = 0; i < 5; ++i) {
+                mean[i] += weight[part] * slope[i];
+                point[i] = x[i] + h * reach[part] * slope[i];
+            }
+        }
+        for (int i = 0; i < 5; ++i) {
+            line[k % 1].y[i][k / 1] = x[i] + 0.5 * h * mean[i];
+            x[i] += h * mean[i];
+        }
+    }
+}
+
 /* toda3_LANES steps at once: guess the points of all, and correct them together until the error that remains is as
-   small as after a single step. 0, and the solver as before, where that does not come about. */
-static int toda3_block(toda3_solver *s, toda3_table *table)
+   small as after a single step. How many passes that took; 0, and the solver as before, where it takes more than most. */
+static int toda3_block(toda3_solver *s, toda3_table *table, int most)
 {
     toda3_lines line[1];
     double x[5], carry[5], value[5], previous = HUGE_VAL;
     int passes = 0, solved = 0;
-    for (int stage = 0; stage < 1; ++stage)
+    if (!s->foreseeing) toda3_march(s, line);
+    for (int stage = 0; stage < 1 && s->foreseeing; ++stage)
         toda3_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
     while (!solved) {
         double size = 0.0;
@@ -993,12 +1029,11 @@ static int toda3_block(toda3_solver *s, toda3_table *table)
         const double growth = size / (previous * previous);
         /* The second test: after the square of so small a correction there is rounding only. */
         solved = size * size * (growth > 1.0 ? growth : 1.0) <= 1e-20 || (previous < 1e-8 && size < 1e-10);
-        if (++passes == 4 || !(size < previous)) break;
+        if ((++passes >= most || !(size < previous)) && !solved) return 0;
         previous = size;
     }
     for (int i = 0; i < 5; ++i)
         if (!isfinite(x[i])) return 0;
-    if (!solved) return 0;
     memcpy(s->x, x, sizeof x);
     memcpy(s->carry, carry, sizeof carry);
     s->steps += toda3_LANES;
@@ -1009,52 +1044,72 @@ static int toda3_block(toda3_solver *s, toda3_table *table)
             toda3_record(memory, value);
         }
         memory->slow = passes > 1 ? memory->slow + toda3_LANES : 0;
-        if (memory->slow > memory->patience) toda3_fit(memory);
+        if (memory->slow > memory->patience && s->foreseeing) toda3_fit(memory);
     }
-    return 1;
+    return passes;
 }
 
-/* Whether a block may be tried: not before there are recurrences to guess with, and not for a while after one that
-   failed. They take a thousand steps to repay. */
-static int toda3_may_block(toda3_solver *s, double h, size_t steps)
+/* How the next block is guessed: by recurrences once they are fitted, which takes a thousand steps to repay. */
+static void toda3_choose_guess(toda3_solver *s, size_t steps)
 {
-    int fit = s->setback > 0 && s->steps - s->fitted >= 1000;
-    if (!s->ready || memcmp(&h, &s->h, sizeof h) != 0 || steps < toda3_LANES) return 0;
-    if (s->pause > 0) {
-        --s->pause;
-        return 0;
-    }
-    for (int stage = 0; stage < 1; ++stage) {
-        fit = fit || s->memory[stage].fits == 0;
-        if (s->memory[stage].count < 96) return 0;
-    }
-    if (fit && steps < 1000) return 0;
-    for (int stage = 0; stage < 1 && fit; ++stage) toda3_fit(&s->memory[stage]);
-    if (fit) s->fitted = s->steps;
-    return 1;
+    for (int stage = 0; stage < 1; ++stage)
+        if (s->memory[stage].count < 96) {
+            s->foreseeing = 0;
+            return;
+        }
+    if (s->foreseeing || steps < 1000 || s->steps < s->retry) return;
+    for (int stage = 0; stage < 1; ++stage) toda3_fit(&s->memory[stage]);
+    s->foreseeing = 1;
+    s->pause = toda3_LANES;
 }
 
-/* Blocks of steps where the motion can be foreseen, single steps elsewhere: the results differ by round-off only. */
+/* Learn from a block: recurrences that guess no better than steps by Runge-Kutta are given up for a while, and so are
+   blocks that fail with those. */
+static void toda3_learn_from(toda3_solver *s, int passes)
+{
+    if (s->foreseeing && (passes == 0 || (passes > 1 && passes >= s->passes))) {
+        s->foreseeing = 0;
+        s->doubt = 2 * s->doubt + 2000;
+        s->retry = s->steps + s->doubt;
+    } else if (passes == 0) {
+        s->setback = 2 * s->setback + toda3_LANES > 1000 ? 1000 : 2 * s->setback + toda3_LANES;
+        s->pause = s->setback;
+    } else {
+        s->setback /= 2;
+        if (!s->foreseeing) s->passes = passes;
+    }
+}
+
+/* A single step, and the running mean of the evaluations that a stage of one takes. */
+static toda3_status toda3_single(toda3_solver *s)
+{
+    const size_t before = s->evaluations;
+    const toda3_status status = toda3_step(s, s->h);
+    s->effort += 0.125 * ((double)(s->evaluations - before) / 1 - s->effort);
+    return status;
+}
+
+/* Blocks of steps where they cost less than single steps, with at most as many passes over a block as 2 for each
+   evaluation in a single step. The results differ by round-off only. */
 toda3_status toda3_integrate(toda3_solver *s, double h, size_t steps)
 {
     toda3_table table;
+    toda3_status status = toda3_set_step(s, h);
     for (int stage = 0; stage < 1; ++stage) table.fits[stage] = -1;
-    while (steps > 0) {
-        if (s != NULL && toda3_may_block(s, h, steps)) {
+    while (status == toda3_OK && steps > 0) {
+        if (steps >= toda3_LANES && s->pause == 0) toda3_choose_guess(s, steps);
+        if (steps >= toda3_LANES && s->pause == 0) {
             toda3_tell(s, &table);
-            if (toda3_block(s, &table)) {
-                steps -= toda3_LANES;
-                s->setback /= 2;
-                continue;
-            }
-            s->setback = 2 * s->setback + toda3_LANES > 1000 ? 1000 : 2 * s->setback + toda3_LANES;
-            s->pause = s->setback;
+            const int passes = toda3_block(s, &table, (int)(2 * s->effort + 0.5));
+            toda3_learn_from(s, passes);
+            if (passes > 0) steps -= toda3_LANES;
+        } else {
+            if (s->pause > 0) --s->pause;
+            status = toda3_single(s);
+            if (status == toda3_OK) --steps;
         }
-        const toda3_status status = toda3_step(s, h);
-        if (status != toda3_OK) return status;
-        --steps;
     }
-    return toda3_OK;
+    return status;
 }
 
 toda3_status toda3_ensemble(const toda3_params *params, double *x, size_t members, double h, size_t steps,

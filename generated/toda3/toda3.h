@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: b4ffcc49574b293ea7d7e8bfa3ee8b35d494075ac59256ccbbcabdb7560ab46d
+ * body-sha256: 3345f30590b74db99c78148105540cbd121fe4c4ea42ed8623438d56a627d643
  */
 #ifndef TODA3_H
 #define TODA3_H
@@ -67,9 +67,13 @@ typedef struct {
     toda3_params params;
     double h;  /* the step size that coef belongs to */
     int ready; /* whether coef has been computed */
-    int pause;   /* steps to make singly before a block is tried */
-    int setback; /* the last pause, halved with every block that succeeds */
-    size_t fitted; /* steps when recurrences were last fitted for blocks */
+    double effort;  /* evaluations that a single step takes, for each stage */
+    int pause;      /* steps to make singly before a block is tried */
+    int setback;    /* the last pause, halved with every block that succeeds */
+    int foreseeing; /* whether blocks are guessed by recurrences */
+    int passes;     /* that the last block took which was not */
+    size_t doubt;   /* steps to wait before recurrences are tried again */
+    size_t retry;   /* steps after which that is */
     double coef[1][10]; /* what depends on params and h only, for each stage */
     toda3_memory memory[1];
 } toda3_solver;

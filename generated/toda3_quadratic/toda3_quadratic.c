@@ -12,7 +12,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: ea1d17ea9a4eaa53950ccc94c90cd15b12e4204fc09b6edb383bf62f981614b0
+ * body-sha256: 74d2cb5e5a08f974b5887b4050ff736332675dea0d9d321b84139a352a09eff1
  */
 #include "toda3_quadratic.h"
 
@@ -518,17 +518,24 @@ toda3_quadratic_status toda3_quadratic_init(toda3_quadratic_solver *s, const tod
     return toda3_quadratic_OK;
 }
 
-toda3_quadratic_status toda3_quadratic_step(toda3_quadratic_solver *s, double h)
+/* What depends on the step size; nothing where that is as before. */
+static toda3_quadratic_status toda3_quadratic_set_step(toda3_quadratic_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return toda3_quadratic_BAD_ARGUMENT;
-    if (!s->ready || memcmp(&h, &s->h, sizeof h) != 0) {
-        for (int stage = 0; stage < 1; ++stage)
-            toda3_quadratic_prepare(&s->params, toda3_quadratic_fractions[stage] * h, s->coef[stage]);
-        memset(s->memory, 0, sizeof s->memory);
-        s->h = h;
-        s->ready = 1;
-    }
-    const toda3_quadratic_status status = toda3_quadratic_stages(s);
+    if (s->ready && memcmp(&h, &s->h, sizeof h) == 0) return toda3_quadratic_OK;
+    for (int stage = 0; stage < 1; ++stage)
+        toda3_quadratic_prepare(&s->params, toda3_quadratic_fractions[stage] * h, s->coef[stage]);
+    memset(s->memory, 0, sizeof s->memory);
+    s->h = h;
+    s->ready = 1;
+    return toda3_quadratic_OK;
+}
+
+toda3_quadratic_status toda3_quadratic_step(toda3_quadratic_solver *s, double h)
+{
+    toda3_quadratic_status status = toda3_quadratic_set_step(s, h);
+    if (status != toda3_quadratic_OK) return status;
+    status = toda3_quadratic_stages(s);
     if (status == toda3_quadratic_OK) ++s->steps;
     return status;
 }

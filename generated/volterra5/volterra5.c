@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 421b3c88cad463f89d41f1c7927f46db0ef254320b18a15886097287ea53b996
+ * body-sha256: bec83f86d4d895c68d39ddad73933b3628e0be76e83e56fd4914e4b57d90306d
  */
 #include "volterra5.h"
 
@@ -463,17 +463,28 @@ volterra5_status volterra5_init(volterra5_solver *s, const volterra5_params *par
     return volterra5_OK;
 }
 
-volterra5_status volterra5_step(volterra5_solver *s, double h)
+/* What depends on the step size; nothing where that is as before. */
+static volterra5_status volterra5_set_step(volterra5_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return volterra5_BAD_ARGUMENT;
-    if (!s->ready || memcmp(&h, &s->h, sizeof h) != 0) {
-        for (int stage = 0; stage < 1; ++stage)
-            volterra5_prepare(&s->params, volterra5_fractions[stage] * h, s->coef[stage]);
-        memset(s->memory, 0, sizeof s->memory);
-        s->h = h;
-        s->ready = 1;
-    }
-    const volterra5_status status = volterra5_stages(s);
+    if (s->ready && memcmp(&h, &s->h, sizeof h) == 0) return volterra5_OK;
+    for (int stage = 0; stage < 1; ++stage)
+        volterra5_prepare(&s->params, volterra5_fractions[stage] * h, s->coef[stage]);
+    memset(s->memory, 0, sizeof s->memory);
+    s->pause = 16;
+    s->setback = s->foreseeing = 0;
+    s->doubt = s->retry = 0;
+    s->effort = 0.0;
+    s->h = h;
+    s->ready = 1;
+    return volterra5_OK;
+}
+
+volterra5_status volterra5_step(volterra5_solver *s, double h)
+{
+    volterra5_status status = volterra5_set_step(s, h);
+    if (status != volterra5_OK) return status;
+    status = volterra5_stages(s);
     if (status == volterra5_OK) ++s->steps;
     return status;
 }
@@ -832,7 +843,7 @@ static void volterra5_tell(const volterra5_solver *s, volterra5_table *table)
     }
 }
 
-/* The guesses for the next volterra5_LANES values. */
+/* Guesses for the next volterra5_LANES values of a stage, by its recurrences. */
 static void volterra5_foresee(const volterra5_memory *memory, volterra5_lanes weight[restrict][5],
     volterra5_lanes y[restrict 5])
 {
@@ -872,14 +883,39 @@ static double volterra5_correct(volterra5_lines *line)
     return isfinite(total) ? largest : HUGE_VAL;
 }
 
+/* Guesses where no recurrence is known: midpoints of steps by the classical Runge-Kutta method. */
+static void volterra5_march(const volterra5_solver *s, volterra5_lines line[1])
+{
+    static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
+    double x[5], point[5], slope[5], mean[5];
+    memcpy(x, s->x, sizeof x);
+    for (int k = 0; k < 1 * volterra5_LANES; ++k) {
+        const double h = volterra5_fractions[k % 1] * s->h;
+        memcpy(point, x, sizeof x);
+        memset(mean, 0, sizeof mean);
+        for (int part = 0; part < 4; ++part) {
+            volterra5_vector_field(&s->params, point, slope);
+            for (int i = 0; i < 5; ++i) {
+                mean[i] += weight[part] * slope[i];
+                point[i] = x[i] + h * reach[part] * slope[i];
+            }
+        }
+        for (int i = 0; i < 5; ++i) {
+            line[k % 1].y[i][k / 1] = x[i] + 0.5 * h * mean[i];
+            x[i] += h * mean[i];
+        }
+    }
+}
+
 /* volterra5_LANES steps at once: guess the points of all, and correct them together until the error that remains is as
-   small as after a single step. 0, and the solver as before, where that does not come about. */
-static int volterra5_block(volterra5_solver *s, volterra5_table *table)
+   small as after a single step. How many passes that took; 0, and the solver as before, where it takes more than most. */
+static int volterra5_block(volterra5_solver *s, volterra5_table *table, int most)
 {
     volterra5_lines line[1];
     double x[5], carry[5], value[5], previous = HUGE_VAL;
     int passes = 0, solved = 0;
-    for (int stage = 0; stage < 1; ++stage)
+    if (!s->foreseeing) volterra5_march(s, line);
+    for (int stage = 0; stage < 1 && s->foreseeing; ++stage)
         volterra5_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
     while (!solved) {
         double size = 0.0;
@@ -892,12 +928,11 @@ static int volterra5_block(volterra5_solver *s, volterra5_table *table)
         const double growth = size / (previous * previous);
         /* The second test: after the square of so small a correction there is rounding only. */
         solved = size * size * (growth > 1.0 ? growth : 1.0) <= 1e-20 || (previous < 1e-8 && size < 1e-10);
-        if (++passes == 4 || !(size < previous)) break;
+        if ((++passes >= most || !(size < previous)) && !solved) return 0;
         previous = size;
     }
     for (int i = 0; i < 5; ++i)
         if (!isfinite(x[i])) return 0;
-    if (!solved) return 0;
     memcpy(s->x, x, sizeof x);
     memcpy(s->carry, carry, sizeof carry);
     s->steps += volterra5_LANES;
@@ -908,52 +943,72 @@ static int volterra5_block(volterra5_solver *s, volterra5_table *table)
             volterra5_record(memory, value);
         }
         memory->slow = passes > 1 ? memory->slow + volterra5_LANES : 0;
-        if (memory->slow > memory->patience) volterra5_fit(memory);
+        if (memory->slow > memory->patience && s->foreseeing) volterra5_fit(memory);
     }
-    return 1;
+    return passes;
 }
 
-/* Whether a block may be tried: not before there are recurrences to guess with, and not for a while after one that
-   failed. They take a thousand steps to repay. */
-static int volterra5_may_block(volterra5_solver *s, double h, size_t steps)
+/* How the next block is guessed: by recurrences once they are fitted, which takes a thousand steps to repay. */
+static void volterra5_choose_guess(volterra5_solver *s, size_t steps)
 {
-    int fit = s->setback > 0 && s->steps - s->fitted >= 1000;
-    if (!s->ready || memcmp(&h, &s->h, sizeof h) != 0 || steps < volterra5_LANES) return 0;
-    if (s->pause > 0) {
-        --s->pause;
-        return 0;
-    }
-    for (int stage = 0; stage < 1; ++stage) {
-        fit = fit || s->memory[stage].fits == 0;
-        if (s->memory[stage].count < 96) return 0;
-    }
-    if (fit && steps < 1000) return 0;
-    for (int stage = 0; stage < 1 && fit; ++stage) volterra5_fit(&s->memory[stage]);
-    if (fit) s->fitted = s->steps;
-    return 1;
+    for (int stage = 0; stage < 1; ++stage)
+        if (s->memory[stage].count < 96) {
+            s->foreseeing = 0;
+            return;
+        }
+    if (s->foreseeing || steps < 1000 || s->steps < s->retry) return;
+    for (int stage = 0; stage < 1; ++stage) volterra5_fit(&s->memory[stage]);
+    s->foreseeing = 1;
+    s->pause = volterra5_LANES;
 }
 
-/* Blocks of steps where the motion can be foreseen, single steps elsewhere: the results differ by round-off only. */
+/* Learn from a block: recurrences that guess no better than steps by Runge-Kutta are given up for a while, and so are
+   blocks that fail with those. */
+static void volterra5_learn_from(volterra5_solver *s, int passes)
+{
+    if (s->foreseeing && (passes == 0 || (passes > 1 && passes >= s->passes))) {
+        s->foreseeing = 0;
+        s->doubt = 2 * s->doubt + 2000;
+        s->retry = s->steps + s->doubt;
+    } else if (passes == 0) {
+        s->setback = 2 * s->setback + volterra5_LANES > 1000 ? 1000 : 2 * s->setback + volterra5_LANES;
+        s->pause = s->setback;
+    } else {
+        s->setback /= 2;
+        if (!s->foreseeing) s->passes = passes;
+    }
+}
+
+/* A single step, and the running mean of the evaluations that a stage of one takes. */
+static volterra5_status volterra5_single(volterra5_solver *s)
+{
+    const size_t before = s->evaluations;
+    const volterra5_status status = volterra5_step(s, s->h);
+    s->effort += 0.125 * ((double)(s->evaluations - before) / 1 - s->effort);
+    return status;
+}
+
+/* Blocks of steps where they cost less than single steps, with at most as many passes over a block as 2 for each
+   evaluation in a single step. The results differ by round-off only. */
 volterra5_status volterra5_integrate(volterra5_solver *s, double h, size_t steps)
 {
     volterra5_table table;
+    volterra5_status status = volterra5_set_step(s, h);
     for (int stage = 0; stage < 1; ++stage) table.fits[stage] = -1;
-    while (steps > 0) {
-        if (s != NULL && volterra5_may_block(s, h, steps)) {
+    while (status == volterra5_OK && steps > 0) {
+        if (steps >= volterra5_LANES && s->pause == 0) volterra5_choose_guess(s, steps);
+        if (steps >= volterra5_LANES && s->pause == 0) {
             volterra5_tell(s, &table);
-            if (volterra5_block(s, &table)) {
-                steps -= volterra5_LANES;
-                s->setback /= 2;
-                continue;
-            }
-            s->setback = 2 * s->setback + volterra5_LANES > 1000 ? 1000 : 2 * s->setback + volterra5_LANES;
-            s->pause = s->setback;
+            const int passes = volterra5_block(s, &table, (int)(2 * s->effort + 0.5));
+            volterra5_learn_from(s, passes);
+            if (passes > 0) steps -= volterra5_LANES;
+        } else {
+            if (s->pause > 0) --s->pause;
+            status = volterra5_single(s);
+            if (status == volterra5_OK) --steps;
         }
-        const volterra5_status status = volterra5_step(s, h);
-        if (status != volterra5_OK) return status;
-        --steps;
     }
-    return volterra5_OK;
+    return status;
 }
 
 volterra5_status volterra5_ensemble(const volterra5_params *params, double *x, size_t members, double h,

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 3386b521fcb3138984699699ce486405d8c6ad61bb7c96a7c247fa12976c817f
+ * body-sha256: fe72ce3c6d4115375a35a8ca821518b5dfb7cc9c8bd2f4aceb03319fb5bf43b0
  */
 #ifndef VOLTERRA5_H
 #define VOLTERRA5_H
@@ -67,9 +67,13 @@ typedef struct {
     volterra5_params params;
     double h;  /* the step size that coef belongs to */
     int ready; /* whether coef has been computed */
-    int pause;   /* steps to make singly before a block is tried */
-    int setback; /* the last pause, halved with every block that succeeds */
-    size_t fitted; /* steps when recurrences were last fitted for blocks */
+    double effort;  /* evaluations that a single step takes, for each stage */
+    int pause;      /* steps to make singly before a block is tried */
+    int setback;    /* the last pause, halved with every block that succeeds */
+    int foreseeing; /* whether blocks are guessed by recurrences */
+    int passes;     /* that the last block took which was not */
+    size_t doubt;   /* steps to wait before recurrences are tried again */
+    size_t retry;   /* steps after which that is */
     double coef[1][4]; /* what depends on params and h only, for each stage */
     volterra5_memory memory[1];
 } volterra5_solver;

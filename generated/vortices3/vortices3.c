@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 4f6db6d4284692fcb0da28d69d4c28c49a7da9aa390f49de25f4b48577869e03
+ * body-sha256: 2edb13d88c3aea871e7f87648dd82668b26c265314fd69a29dedce10ad70e449
  */
 #include "vortices3.h"
 
@@ -971,17 +971,28 @@ vortices3_status vortices3_init(vortices3_solver *s, const vortices3_params *par
     return vortices3_OK;
 }
 
-vortices3_status vortices3_step(vortices3_solver *s, double h)
+/* What depends on the step size; nothing where that is as before. */
+static vortices3_status vortices3_set_step(vortices3_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return vortices3_BAD_ARGUMENT;
-    if (!s->ready || memcmp(&h, &s->h, sizeof h) != 0) {
-        for (int stage = 0; stage < 1; ++stage)
-            vortices3_prepare(&s->params, vortices3_fractions[stage] * h, s->coef[stage]);
-        memset(s->memory, 0, sizeof s->memory);
-        s->h = h;
-        s->ready = 1;
-    }
-    const vortices3_status status = vortices3_stages(s);
+    if (s->ready && memcmp(&h, &s->h, sizeof h) == 0) return vortices3_OK;
+    for (int stage = 0; stage < 1; ++stage)
+        vortices3_prepare(&s->params, vortices3_fractions[stage] * h, s->coef[stage]);
+    memset(s->memory, 0, sizeof s->memory);
+    s->pause = 16;
+    s->setback = s->foreseeing = 0;
+    s->doubt = s->retry = 0;
+    s->effort = 0.0;
+    s->h = h;
+    s->ready = 1;
+    return vortices3_OK;
+}
+
+vortices3_status vortices3_step(vortices3_solver *s, double h)
+{
+    vortices3_status status = vortices3_set_step(s, h);
+    if (status != vortices3_OK) return status;
+    status = vortices3_stages(s);
     if (status == vortices3_OK) ++s->steps;
     return status;
 }
@@ -1824,7 +1835,7 @@ static void vortices3_tell(const vortices3_solver *s, vortices3_table *table)
     }
 }
 
-/* The guesses for the next vortices3_LANES values. */
+/* Guesses for the next vortices3_LANES values of a stage, by its recurrences. */
 static void vortices3_foresee(const vortices3_memory *memory, vortices3_lanes weight[restrict][6],
     vortices3_lanes y[restrict 6])
 {
@@ -1864,14 +1875,39 @@ static double vortices3_correct(vortices3_lines *line)
     return isfinite(total) ? largest : HUGE_VAL;
 }
 
+/* Guesses where no recurrence is known: midpoints of steps by the classical Runge-Kutta method. */
+static void vortices3_march(const vortices3_solver *s, vortices3_lines line[1])
+{
+    static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
+    double x[6], point[6], slope[6], mean[6];
+    memcpy(x, s->x, sizeof x);
+    for (int k = 0; k < 1 * vortices3_LANES; ++k) {
+        const double h = vortices3_fractions[k % 1] * s->h;
+        memcpy(point, x, sizeof x);
+        memset(mean, 0, sizeof mean);
+        for (int part = 0; part < 4; ++part) {
+            vortices3_vector_field(&s->params, point, slope);
+            for (int i = 0; i < 6; ++i) {
+                mean[i] += weight[part] * slope[i];
+                point[i] = x[i] + h * reach[part] * slope[i];
+            }
+        }
+        for (int i = 0; i < 6; ++i) {
+            line[k % 1].y[i][k / 1] = x[i] + 0.5 * h * mean[i];
+            x[i] += h * mean[i];
+        }
+    }
+}
+
 /* vortices3_LANES steps at once: guess the points of all, and correct them together until the error that remains is as
-   small as after a single step. 0, and the solver as before, where that does not come about. */
-static int vortices3_block(vortices3_solver *s, vortices3_table *table)
+   small as after a single step. How many passes that took; 0, and the solver as before, where it takes more than most. */
+static int vortices3_block(vortices3_solver *s, vortices3_table *table, int most)
 {
     vortices3_lines line[1];
     double x[6], carry[6], value[6], previous = HUGE_VAL;
     int passes = 0, solved = 0;
-    for (int stage = 0; stage < 1; ++stage)
+    if (!s->foreseeing) vortices3_march(s, line);
+    for (int stage = 0; stage < 1 && s->foreseeing; ++stage)
         vortices3_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
     while (!solved) {
         double size = 0.0;
@@ -1884,12 +1920,11 @@ static int vortices3_block(vortices3_solver *s, vortices3_table *table)
         const double growth = size / (previous * previous);
         /* The second test: after the square of so small a correction there is rounding only. */
         solved = size * size * (growth > 1.0 ? growth : 1.0) <= 1e-20 || (previous < 1e-8 && size < 1e-10);
-        if (++passes == 4 || !(size < previous)) break;
+        if ((++passes >= most || !(size < previous)) && !solved) return 0;
         previous = size;
     }
     for (int i = 0; i < 6; ++i)
         if (!isfinite(x[i])) return 0;
-    if (!solved) return 0;
     memcpy(s->x, x, sizeof x);
     memcpy(s->carry, carry, sizeof carry);
     s->steps += vortices3_LANES;
@@ -1900,52 +1935,72 @@ static int vortices3_block(vortices3_solver *s, vortices3_table *table)
             vortices3_record(memory, value);
         }
         memory->slow = passes > 1 ? memory->slow + vortices3_LANES : 0;
-        if (memory->slow > memory->patience) vortices3_fit(memory);
+        if (memory->slow > memory->patience && s->foreseeing) vortices3_fit(memory);
     }
-    return 1;
+    return passes;
 }
 
-/* Whether a block may be tried: not before there are recurrences to guess with, and not for a while after one that
-   failed. They take a thousand steps to repay. */
-static int vortices3_may_block(vortices3_solver *s, double h, size_t steps)
+/* How the next block is guessed: by recurrences once they are fitted, which takes a thousand steps to repay. */
+static void vortices3_choose_guess(vortices3_solver *s, size_t steps)
 {
-    int fit = s->setback > 0 && s->steps - s->fitted >= 1000;
-    if (!s->ready || memcmp(&h, &s->h, sizeof h) != 0 || steps < vortices3_LANES) return 0;
-    if (s->pause > 0) {
-        --s->pause;
-        return 0;
-    }
-    for (int stage = 0; stage < 1; ++stage) {
-        fit = fit || s->memory[stage].fits == 0;
-        if (s->memory[stage].count < 96) return 0;
-    }
-    if (fit && steps < 1000) return 0;
-    for (int stage = 0; stage < 1 && fit; ++stage) vortices3_fit(&s->memory[stage]);
-    if (fit) s->fitted = s->steps;
-    return 1;
+    for (int stage = 0; stage < 1; ++stage)
+        if (s->memory[stage].count < 96) {
+            s->foreseeing = 0;
+            return;
+        }
+    if (s->foreseeing || steps < 1000 || s->steps < s->retry) return;
+    for (int stage = 0; stage < 1; ++stage) vortices3_fit(&s->memory[stage]);
+    s->foreseeing = 1;
+    s->pause = vortices3_LANES;
 }
 
-/* Blocks of steps where the motion can be foreseen, single steps elsewhere: the results differ by round-off only. */
+/* Learn from a block: recurrences that guess no better than steps by Runge-Kutta are given up for a while, and so are
+   blocks that fail with those. */
+static void vortices3_learn_from(vortices3_solver *s, int passes)
+{
+    if (s->foreseeing && (passes == 0 || (passes > 1 && passes >= s->passes))) {
+        s->foreseeing = 0;
+        s->doubt = 2 * s->doubt + 2000;
+        s->retry = s->steps + s->doubt;
+    } else if (passes == 0) {
+        s->setback = 2 * s->setback + vortices3_LANES > 1000 ? 1000 : 2 * s->setback + vortices3_LANES;
+        s->pause = s->setback;
+    } else {
+        s->setback /= 2;
+        if (!s->foreseeing) s->passes = passes;
+    }
+}
+
+/* A single step, and the running mean of the evaluations that a stage of one takes. */
+static vortices3_status vortices3_single(vortices3_solver *s)
+{
+    const size_t before = s->evaluations;
+    const vortices3_status status = vortices3_step(s, s->h);
+    s->effort += 0.125 * ((double)(s->evaluations - before) / 1 - s->effort);
+    return status;
+}
+
+/* Blocks of steps where they cost less than single steps, with at most as many passes over a block as 2 for each
+   evaluation in a single step. The results differ by round-off only. */
 vortices3_status vortices3_integrate(vortices3_solver *s, double h, size_t steps)
 {
     vortices3_table table;
+    vortices3_status status = vortices3_set_step(s, h);
     for (int stage = 0; stage < 1; ++stage) table.fits[stage] = -1;
-    while (steps > 0) {
-        if (s != NULL && vortices3_may_block(s, h, steps)) {
+    while (status == vortices3_OK && steps > 0) {
+        if (steps >= vortices3_LANES && s->pause == 0) vortices3_choose_guess(s, steps);
+        if (steps >= vortices3_LANES && s->pause == 0) {
             vortices3_tell(s, &table);
-            if (vortices3_block(s, &table)) {
-                steps -= vortices3_LANES;
-                s->setback /= 2;
-                continue;
-            }
-            s->setback = 2 * s->setback + vortices3_LANES > 1000 ? 1000 : 2 * s->setback + vortices3_LANES;
-            s->pause = s->setback;
+            const int passes = vortices3_block(s, &table, (int)(2 * s->effort + 0.5));
+            vortices3_learn_from(s, passes);
+            if (passes > 0) steps -= vortices3_LANES;
+        } else {
+            if (s->pause > 0) --s->pause;
+            status = vortices3_single(s);
+            if (status == vortices3_OK) --steps;
         }
-        const vortices3_status status = vortices3_step(s, h);
-        if (status != vortices3_OK) return status;
-        --steps;
     }
-    return vortices3_OK;
+    return status;
 }
 
 vortices3_status vortices3_ensemble(const vortices3_params *params, double *x, size_t members, double h,

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: cf0227e98314cb6da0c893d991d6fe20e77d4daf282e2ec3f41073e0759f0616
+ * body-sha256: 1aa7aae4a7d3ed33c4813e41443b5906471dae733433ba0b4175d9f45ae8bba9
  */
 #ifndef VORTICES3_H
 #define VORTICES3_H
@@ -67,9 +67,13 @@ typedef struct {
     vortices3_params params;
     double h;  /* the step size that coef belongs to */
     int ready; /* whether coef has been computed */
-    int pause;   /* steps to make singly before a block is tried */
-    int setback; /* the last pause, halved with every block that succeeds */
-    size_t fitted; /* steps when recurrences were last fitted for blocks */
+    double effort;  /* evaluations that a single step takes, for each stage */
+    int pause;      /* steps to make singly before a block is tried */
+    int setback;    /* the last pause, halved with every block that succeeds */
+    int foreseeing; /* whether blocks are guessed by recurrences */
+    int passes;     /* that the last block took which was not */
+    size_t doubt;   /* steps to wait before recurrences are tried again */
+    size_t retry;   /* steps after which that is */
     double coef[1][3]; /* what depends on params and h only, for each stage */
     vortices3_memory memory[1];
 } vortices3_solver;

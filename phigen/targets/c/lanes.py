@@ -8,11 +8,35 @@ from collections.abc import Mapping
 from phigen.scheme.program import Program
 from phigen.symbolic.expression import topological
 from phigen.symbolic.special import LANE_REACH, SPECIAL, lane_coefficients, order_of
-from phigen.targets.c.kernels import LANES, each_lane, function
+from phigen.targets.c.kernels import FUNCTIONS, LANE_FUNCTIONS, LANES, each_lane, function
 from phigen.targets.rendering import render
 
 #: Bytes that the working arrays of a block may take on the stack.
 MOST_STACK = 256 * 1024
+
+#: Passes over a block that cost, per step, what an evaluation at one point costs: with loops that are vectorised, and
+#: with loops that are not as they call functions of the library.
+PASSES, PASSES_OF_CALLS = 2, 1
+
+#: Functions that are instructions, or arithmetic.
+_INLINE = {"abs", "sqrt", "sign", "inv"}
+
+_MEMBERS = [
+    "double effort;  /* evaluations that a single step takes, for each stage */",
+    "int pause;      /* steps to make singly before a block is tried */",
+    "int setback;    /* the last pause, halved with every block that succeeds */",
+    "int foreseeing; /* whether blocks are guessed by recurrences */",
+    "int passes;     /* that the last block took which was not */",
+    "size_t doubt;   /* steps to wait before recurrences are tried again */",
+    "size_t retry;   /* steps after which that is */",
+]
+
+_RESET = [
+    f"s->pause = {2 * LANES};",
+    "s->setback = s->foreseeing = 0;",
+    "s->doubt = s->retry = 0;",
+    "s->effort = 0.0;",
+]
 
 #: Terms of the series of exp(r) − 1 for |r| ≤ ½ log 2, and the largest argument of exp in a lane.
 _EXP_TERMS, _EXP_REACH = 14, 700.0
@@ -25,19 +49,23 @@ def blocks(program: Program) -> bool:
     return program.driver == "newton" and 8 * LANES * values <= MOST_STACK
 
 
+def vectorised(program: Program) -> bool:
+    """Whether compilers can make vector instructions of the lanes: not of calls to functions of the library."""
+    if not blocks(program):
+        return False
+    calls = set(FUNCTIONS) - set(LANE_FUNCTIONS) - _INLINE
+    return not calls & {e.op for e in topological(program.kernels["linearise"].roots)}
+
+
 def values(program: Program) -> Mapping[str, object]:
     """What the templates of this room read."""
     return {
         "lanes": LANES,
         "each_lane": each_lane(program),
         "floor": "0.0" if program.relative else "1e-6",
-        "block_members": [
-            "int pause;   /* steps to make singly before a block is tried */",
-            "int setback; /* the last pause, halved with every block that succeeds */",
-            "size_t fitted; /* steps when recurrences were last fitted for blocks */",
-        ]
-        if blocks(program)
-        else [],
+        "passes": PASSES if vectorised(program) else PASSES_OF_CALLS,
+        "block_members": _MEMBERS if blocks(program) else [],
+        "block_reset": _RESET if blocks(program) else [],
     }
 
 
@@ -56,7 +84,7 @@ def pieces(program: Program, values: Mapping[str, object]) -> list[str]:
         found.append(render("c", "tabulate_unrolled.c", values))
     else:
         found.append(render("c", "tabulate.c", values))
-    templates = ("sizes", "chain", "block", "block_step", "integrate_blocks", "ensemble")
+    templates = ("sizes", "chain", "block", "march", "block_step", "choose_guess", "integrate_blocks", "ensemble")
     return found + [render("c", f"{template}.c", values) for template in templates]
 
 
