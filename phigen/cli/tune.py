@@ -65,8 +65,8 @@ def command(
 
     _expect_positive(horizon, "--horizon")
     _expect_positive(budget, "--budget")
-    if plot and Path(plot).suffix.lower() not in _PLOTS:
-        raise click.BadParameter(f"{plot!r} must end in {', '.join(_PLOTS)}", param_hint="--plot")
+    if plot:
+        _expect_figure(Path(plot))
     spec = load_one(spec_file)
     experiment = prepared(spec, name, settings=settings)
     compilation = compile_proved(spec)
@@ -85,6 +85,17 @@ def command(
         print_tuning(found, spec, experiment.run)
     if not found.winner:
         raise CheckError(unreached(found))
+
+
+def _expect_figure(path: Path) -> None:
+    """What would be in the way of a figure is told before any work is done."""
+    from phigen.analysis.drawing.palette import require_matplotlib
+
+    if path.suffix.lower() not in _PLOTS:
+        raise click.BadParameter(f"{str(path)!r} must end in {', '.join(_PLOTS)}", param_hint="--plot")
+    if not path.parent.is_dir():
+        raise click.BadParameter(f"there is no folder {str(path.parent)!r}", param_hint="--plot")
+    require_matplotlib()
 
 
 def _expect_positive(value: float | None, option: str) -> None:

@@ -115,8 +115,9 @@ def remarks(found: Tuning) -> Iterator[str]:
     for label, peer in ((p.curve.label, p) for p in found.peers if p.cost < best.cost):
         share = peer.cost / best.cost
         yield f"{label} is cheaper: {share:.2g} of the time. It keeps neither Casimirs nor the geometry of phase space."
-    for setting, why in found.refused.items():
-        yield f"Not measured: {setting.described()}: {why}."
+    for reason in dict.fromkeys(found.refused.values()):
+        settings = [s.described() for s, why in found.refused.items() if why == reason]
+        yield f"Not measured: {'; '.join(settings)}: {reason}."
     if not found.finished:
         yield "The budget ended before all promising candidates were tried; --budget takes more seconds."
 

@@ -75,11 +75,12 @@ def test_run_beyond_the_end_of_its_solution_is_explained(phigen):
     assert "ends at t = 0.25538" in done.stderr
 
 
-@pytest.mark.parametrize(
-    "wrong", [["--accuracy", "0"], ["--horizon", "-1"], ["--budget", "nan"], ["--plot", "x.gif"], ["--run", "none"]]
-)
+WRONG = ["--accuracy 0", "--horizon -1", "--budget nan", "--plot x.gif", "--plot none/x.png", "--run none"]
+
+
+@pytest.mark.parametrize("wrong", WRONG)
 def test_wrong_usage(phigen, wrong):
-    assert phigen("tune", SPECS / "henon_heiles.yaml", *wrong).exit_code == 2
+    assert phigen("tune", SPECS / "henon_heiles.yaml", *wrong.split()).exit_code == 2
 
 
 def test_without_compiler_numpy_is_timed(phigen, monkeypatch):

@@ -59,7 +59,8 @@ class Setting:
 
     def described(self, kind: str = "") -> str:
         """In words: ``exponential, order 8, without gauge, kahan-li``; ``kind`` is what it turned out to be."""
-        words = [kind or self.kind, f"order {self.order}"]
+        named = self.kind if self.of == "auto" else f"{self.kind} of {self.of}"
+        words = [kind or named, f"order {self.order}"]
         words += ["without gauge"] if self.gauge == "none" and not self.is_splitting else []
         return ", ".join([*words, self.composition] if self.composition not in ("none", "auto") else words)
 
