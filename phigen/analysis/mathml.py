@@ -154,8 +154,10 @@ def name(identifier: str) -> str:
 
 
 def dotted(identifier: str) -> str:
-    """The derivative of a name by the time, with the dot over its letter."""
+    """The derivative of a name by the time, with a dot over its letter; of a word as a quotient."""
     factor = _name(identifier)
+    if factor.word:
+        return f"<mfrac>{_row('<mi>d</mi>' + factor.markup)}{_row('<mi>d</mi><mi>t</mi>')}</mfrac>"
     return replace(factor, base=f'<mover accent="true">{factor.base}<mo>˙</mo></mover>').markup
 
 

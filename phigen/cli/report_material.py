@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -16,6 +17,11 @@ if TYPE_CHECKING:
     from phigen.analysis.proof import Examination
     from phigen.analysis.verification import Verification
     from phigen.compiler import Compilation
+    from phigen.runtime.solver import Solver
+    from phigen.runtime.trajectory import Trajectory
+
+#: So many first steps are all shown by the viewer.
+_OPENING = 4_000
 
 
 def gathered(
@@ -64,9 +70,11 @@ def _integrated(
     for method in (run.compare or COMPARED) if failure is None else ():
         watch, methods[method] = compared(compilation, solver, experiment, method, console)
         summaries.append(watch.summary())
+    opening = _opening(compilation, solver, experiment, list(methods)[1:2], console) if failure is None else {}
     made = replace(
         material,
         run=run,
+        opening=opening,
         methods=methods,
         summaries=tuple(summaries),
         section=(recorder.section_text, recorder.points.rows[:, 1:], recorder.points.seen) if recorder.finder else None,
@@ -74,6 +82,23 @@ def _integrated(
         notes=(f"The run could not be completed: {failure}.",) if failure else (),
     )
     return made, [failure] if failure else []
+
+
+def _opening(
+    compilation: Compilation, solver: Solver, experiment: Experiment, others: Sequence[str], console: Console
+) -> dict[str, Trajectory]:
+    """Every one of the first steps, by the solver and by other methods; nothing if the run has no more."""
+    from phigen.cli.recording import Files, Recorder, compared, record
+
+    run = experiment.run
+    if run.stride == 1 and run.steps <= _OPENING:
+        return {}
+    first = replace(experiment, run=replace(run, steps=min(run.steps, _OPENING), stride=1, section=None))
+    recorder = Recorder(compilation, solver, first, Files(), lyapunov=False)
+    recorder.start()
+    record(recorder, console)
+    beside = {method: compared(compilation, solver, first, method, console)[1] for method in others}
+    return {recorder.label: recorder.trajectory(False), **beside}
 
 
 def _verified(compilation: Compilation, experiment: Experiment, quick: bool, console: Console) -> Verification:

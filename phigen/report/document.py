@@ -68,13 +68,13 @@ def _run(material: Material) -> Iterator[Markup]:
         yield evidence.lyapunov_paragraph(material.spectrum)
     if not drawable():
         yield page.paragraph(NO_FIGURES, "note")
-        yield viewer(material.methods)
+        yield viewer(material.methods, material.opening, material.compilation.system.casimirs)
         return
     from phigen.report import pictures
 
     yield pictures.error_picture(material)
     yield page.heading("In phase space")
-    yield viewer(material.methods)
+    yield viewer(material.methods, material.opening, material.compilation.system.casimirs)
     yield pictures.trajectory_picture(material.compilation, first)
     if material.section is not None:
         yield pictures.section_picture(first.coordinates, *material.section)

@@ -64,10 +64,10 @@ def _reason(realisation: BiRealisation) -> str:
 
 def proofs_section(material: Material) -> Markup:
     """All statements of `phigen check`."""
-    blocks = []
+    blocks, columns = [], [("", "statement"), ("verdict", "verdict"), ("", "how")]
     for group, statements in material.examination.groups.items():
         rows = [_statement(s) for s in statements]
-        blocks.append(page.table(group, [("", "statement"), ("verdict", "verdict"), ("", "how")], rows))
+        blocks.append(page.table(group, columns, rows, "proofs"))
     said = "Proved means in exact arithmetic, for all values of the coordinates, covectors and parameters."
     return page.joined([page.paragraph(said), *blocks])
 

@@ -49,7 +49,8 @@ ALPHA_BETA_OF_A_PATH = [
      math(f"{_of(_i('β'), _x, _p)}{_o('=')}{_of(_m, '<mn>1</mn>')}")],
 ]  # fmt: skip
 
-BETA_OF_ALPHA = [math(f"{_of(_i('β'), _x, _p)}{_o('=')}{_of(_i('α'), _x, _o('−') + _p)}")]
+_MINUS_P = f'<mo form="prefix">−</mo>{_p}'
+BETA_OF_ALPHA = [math(f"{_of(_i('β'), _x, _p)}{_o('=')}{_of(_i('α'), _x, _MINUS_P)}")]
 
 #: The function φ of the exponential bi-realisation.
 PHI = [

@@ -20,7 +20,8 @@ from phigen.spec.model import Run
 class Material:
     """What was proved, and what was measured on one run; what could not be had is None, and ``notes`` say why.
 
-    ``methods`` are trajectories by their labels, the solver's first. ``section`` is what its Poincaré section is the
+    ``methods`` are trajectories by their labels, the solver's first, ``opening`` every step of the first ones
+    if the run is longer. ``section`` is what its Poincaré section is the
     zero of, some of its points (rows, DIM), and how many there are; ``spectrum`` are its Lyapunov exponents.
     ``environment`` says what the times depend on. ``command`` makes the page again.
     """
@@ -30,6 +31,7 @@ class Material:
     command: str
     run: Run | None = None
     methods: Mapping[str, Trajectory] = field(default_factory=dict)
+    opening: Mapping[str, Trajectory] = field(default_factory=dict)
     summaries: tuple[Summary, ...] = ()
     section: tuple[str, Floats, int] | None = None
     spectrum: Spectrum | None = None

@@ -61,9 +61,9 @@ def heading(text: str) -> Markup:
     return block("heading", text=text)
 
 
-def table(caption: str, columns: Sequence[Cell], rows: Sequence[tuple[str, Sequence[Cell]]]) -> Markup:
-    """A table whose rows have headers; ``columns`` names the first column too."""
-    return block("table", caption=caption, columns=columns, rows=rows)
+def table(caption: str, columns: Sequence[Cell], rows: Sequence[tuple[str, Sequence[Cell]]], kind: str = "") -> Markup:
+    """A table whose rows have headers; ``columns`` names the first column too, ``kind`` is a class."""
+    return block("table", caption=caption, columns=columns, rows=rows, kind=kind)
 
 
 def facts(pairs: Iterable[tuple[str, str]]) -> Markup:
@@ -131,7 +131,7 @@ def typeset(text: str) -> Markup:
     found = str(escape(text))
     found = _SUBSCRIPT.sub(r"<sub>\1</sub>", found)
     found = _POWER.sub(r"<sup>\1</sup>", found)
-    return Markup(_DECIMAL.sub(lambda m: f"·10<sup>{int(m[1])}</sup>".replace("-", "−"), found))
+    return Markup(_DECIMAL.sub(lambda m: "·10" + str(int(m[1])).translate(_SUPERSCRIPTS), found))
 
 
 def scientific(value: float, digits: int = 2) -> str:

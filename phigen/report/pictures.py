@@ -86,7 +86,8 @@ def work_picture(study: Study) -> Markup:
 
 def _picture(identifier: str, figure: Figure, title: str, description: str, caption: str) -> Markup:
     image = inlined(figures.svg(figure), identifier, title, description)
-    return page.block("figure", identifier=f"figure-{identifier}", image=image, caption=caption)
+    kind = "wide" if figure.get_figwidth() > figures.NARROW else ""
+    return page.block("figure", identifier=f"figure-{identifier}", kind=kind, image=image, caption=caption)
 
 
 def _described(s: Summary) -> str:

@@ -8,10 +8,14 @@ from typing import Any
 import numpy as np
 from markupsafe import Markup
 
+from phigen.analysis.arrays import Floats
 from phigen.analysis.drawing.groups import groups
-from phigen.analysis.drawing.phase_space import joins
+from phigen.analysis.drawing.leaf import around, leaf_of, net
+from phigen.analysis.drawing.phase_space import box_of, joins
 from phigen.report import page
+from phigen.report.drawable import drawable
 from phigen.runtime.trajectory import Trajectory
+from phigen.symbolic.expression import Expression
 
 #: Numbers of all curves together, rows of one at most, and the steps to which a coordinate is rounded.
 MOST_NUMBERS, MOST_ROWS, STEPS = 90_000, 4_000, 9_999
@@ -21,14 +25,24 @@ CURVES = 2
 LETTERS = 24
 
 
-def viewer(methods: Mapping[str, Trajectory]) -> Markup:
-    """The viewer of the first trajectory and of the one beside it; nothing if there is no curve to see."""
-    shown = {label: curve for label, curve in list(methods.items())[:CURVES] if len(_finite(curve)) > 1}
-    first = next(iter(shown.values()), None)
+def viewer(
+    methods: Mapping[str, Trajectory], opening: Mapping[str, Trajectory], casimirs: Mapping[str, Expression]
+) -> Markup:
+    """The viewer of the first trajectory and of the one beside it; nothing if there is no curve to see.
+
+    Where the rows of the whole run are too far apart for a line, it shows the ``opening``, the first steps of the same
+    methods. The leaf of one of the ``casimirs`` is around the curve, if there is one in the space it begins with.
+    """
+    first = next(iter(methods.values()), None)
     if first is None:
         return Markup("")
+    axes = _axes(first.coordinates)
+    chosen = opening if opening and not _joined(methods, axes) and _joined(opening, axes) else methods
+    shown = {label: curve for label, curve in list(chosen.items())[:CURVES] if len(_finite(curve)) > 1}
+    if not shown:
+        return Markup("")
     names = [*(c[:LETTERS] for c in first.coordinates), "t"]
-    given = _data(shown, names, _axes(first.coordinates))
+    given = _data(shown, names, axes, _leaf(casimirs, next(iter(shown.values())), axes))
     options = list(enumerate(names))
     return page.block(
         "viewer",
@@ -36,17 +50,37 @@ def viewer(methods: Mapping[str, Trajectory]) -> Markup:
         axes=[(axis, options) for axis in "xyz"],
         curves=list(enumerate(shown, start=1)),
         last=len(given["curves"][0][0]) - 1,
+        until=f" It shows the first part of the run, up to t = {given['high'][-1]:.6g}." if chosen is opening else "",
         data=page.data("viewer-data", given),
     )
 
 
-def _data(methods: Mapping[str, Trajectory], names: list[str], axes: list[int]) -> dict[str, Any]:
+def _joined(methods: Mapping[str, Trajectory], axes: list[int]) -> bool:
+    return joins(_finite(next(iter(methods.values())))[:, axes])
+
+
+def _leaf(casimirs: Mapping[str, Expression], curve: Trajectory, axes: list[int]) -> Floats | None:
+    """Lines (points, 3) of the leaf in the space of the axes, rows of NaN between them; None if there is none."""
+    if not drawable() or len(curve.coordinates) in axes:
+        return None
+    start = dict(zip(curve.coordinates, curve.x[0].tolist(), strict=True))
+    found = leaf_of(casimirs, [curve.coordinates[axis] for axis in axes], start, curve.parameters)
+    if found is None:
+        return None
+    lines = net(found, around(found, box_of(_finite(curve)[:, axes])))
+    return np.concatenate([part for line in lines for part in (line, np.full((1, 3), np.nan))]) if lines else None
+
+
+def _data(methods: Mapping[str, Trajectory], names: list[str], axes: list[int], leaf: Floats | None) -> dict[str, Any]:
     tables = [_finite(curve) for curve in methods.values()]
     most = min(MOST_ROWS, max(2, MOST_NUMBERS // (len(tables) * len(names))))
     stride = max(1, -(-max(map(len, tables)) // most))
     tables = [table[::stride] for table in tables]
     low = np.min([table.min(axis=0) for table in tables], axis=0)
     high = np.max([table.max(axis=0) for table in tables], axis=0)
+    if leaf is not None:
+        low[axes] = np.minimum(low[axes], np.nanmin(leaf, axis=0))
+        high[axes] = np.maximum(high[axes], np.nanmax(leaf, axis=0))
     size = np.where(high > low, high - low, 1.0)
     return {
         "names": names,
@@ -56,7 +90,13 @@ def _data(methods: Mapping[str, Trajectory], names: list[str], axes: list[int]) 
         "steps": STEPS,
         "joined": joins(tables[0][:, axes]),
         "curves": [np.rint((table - low) / size * STEPS).astype(int).T.tolist() for table in tables],
+        "leaf": None if leaf is None else _whole((leaf - low[axes]) / size[axes] * STEPS),
     }
+
+
+def _whole(points: Floats) -> list[list[int | None]]:
+    """Columns of whole numbers, None for NaN."""
+    return [[None if v != v else round(v) for v in column] for column in points.T.tolist()]
 
 
 def _finite(trajectory: Trajectory) -> Any:

@@ -16,4 +16,13 @@
   system.addEventListener("change", name);
   name();
   button.hidden = false;
+  // On paper nothing can be unfolded.
+  let opened = [];
+  addEventListener("beforeprint", () => {
+    opened = [...document.querySelectorAll("details:not([open])")];
+    for (const fold of opened) fold.open = true;
+  });
+  addEventListener("afterprint", () => {
+    for (const fold of opened) fold.open = false;
+  });
 }

@@ -11,7 +11,8 @@ if (document.getElementById("viewer")) {
   let view, turning = false;
 
   // Column `axis` of curve `c` at row `i`: numbers were stored as integers from 0 to data.steps.
-  const value = (c, axis, i) => data.low[axis] + (data.high[axis] - data.low[axis]) * data.curves[c][axis][i] / data.steps;
+  const scaled = (axis, i) => data.low[axis] + ((data.high[axis] - data.low[axis]) * i) / data.steps;
+  const value = (c, axis, i) => scaled(axis, data.curves[c][axis][i]);
   const axes = () => selects.map((s) => Number(s.value));
 
   // The row of curve `c` at the time of row `row` of the first: curves need not have the same rows.
@@ -47,52 +48,71 @@ if (document.getElementById("viewer")) {
     return { middle, half, reach: spans.map((s, k) => s / 2 / half[k]) };
   }
 
+  // The four edges along axis k, as pairs of ends.
+  function edges(k, reach) {
+    return [[-1, -1], [-1, 1], [1, -1], [1, 1]].map(([s, t]) => [-1, 1].map((e) => {
+      const corner = [0, 0, 0];
+      corner[k] = e * reach[k];
+      corner[(k + 1) % 3] = s * reach[(k + 1) % 3];
+      corner[(k + 2) % 3] = t * reach[(k + 2) % 3];
+      return placed(corner);
+    }));
+  }
+
+  // An edge in front of everything: the lowest one or, upwards, the one on the left.
+  function labelled(k, listed) {
+    const place = ([p, q]) => (k === 2 ? -p[0] - q[0] : p[1] + q[1]);
+    return listed.reduce((best, edge) => (place(edge) > place(best) ? edge : best));
+  }
+
   function drawBox(chosen, reach) {
     pen.strokeStyle = pen.fillStyle = getComputedStyle(element("viewer-state")).color;
     pen.lineWidth = 0.7;
-    pen.globalAlpha = 0.45;
-    for (let k = 0; k < 3; k++) {
-      for (const [s, t] of [[-1, -1], [-1, 1], [1, -1], [1, 1]]) {
-        const ends = [-1, 1].map((e) => {
-          const corner = [0, 0, 0];
-          corner[k] = e * reach[k];
-          corner[(k + 1) % 3] = s * reach[(k + 1) % 3];
-          corner[(k + 2) % 3] = t * reach[(k + 2) % 3];
-          return placed(corner);
-        });
+    const [cx, cy] = placed([0, 0, 0]);
+    chosen.forEach((a, k) => {
+      const listed = edges(k, reach);
+      pen.globalAlpha = 0.35;
+      for (const [[x1, y1], [x2, y2]] of listed) {
         pen.beginPath();
-        pen.moveTo(ends[0][0], ends[0][1]);
-        pen.lineTo(ends[1][0], ends[1][1]);
+        pen.moveTo(x1, y1);
+        pen.lineTo(x2, y2);
         pen.stroke();
       }
-    }
-    pen.globalAlpha = 1;
-    pen.font = "14px sans-serif";
-    chosen.forEach((a, k) => {
-      const end = reach.map((r) => -r);
-      end[k] = reach[k] + 0.16;
-      const [x, y] = placed(end);
-      pen.fillText(data.names[a], x - 4, y + 5);
+      pen.globalAlpha = 1;
+      const [[x1, y1], [x2, y2]] = labelled(k, listed);
+      const [mx, my] = [(x1 + x2) / 2, (y1 + y2) / 2], away = 1 / (Math.hypot(mx - cx, my - cy) || 1);
+      const [ox, oy] = [(mx - cx) * away, (my - cy) * away];
+      pen.textAlign = ox < -0.3 ? "right" : ox > 0.3 ? "left" : "center";
+      pen.textBaseline = "middle";
+      const write = (text, x, y, out) => pen.fillText(text, x + out * ox, y + out * oy);
+      pen.font = "italic 14px sans-serif";
+      write(data.names[a], mx, my, 24);
+      pen.font = "12px sans-serif";
+      const end = (number) => rounded(number, Math.max(0, decimals(a) - 2));
+      write(end(data.low[a]), x1 + 0.1 * (x2 - x1), y1 + 0.1 * (y2 - y1), 10);
+      write(end(data.high[a]), x2 + 0.1 * (x1 - x2), y2 + 0.1 * (y1 - y2), 10);
     });
   }
 
-  function drawCurve(c, points) {
-    pen.strokeStyle = pen.fillStyle = colour(c);
-    pen.lineWidth = 1.2;
+  // Points on the screen, null where a line ends; paler towards the back.
+  function drawCurve(points, colour, width, [faint, full], joined) {
+    pen.strokeStyle = pen.fillStyle = colour;
+    pen.lineWidth = width;
     for (let band = 0; band < bands; band++) {
-      pen.globalAlpha = 0.3 + (0.7 * band) / (bands - 1);
+      pen.globalAlpha = faint + ((full - faint) * band) / (bands - 1);
       pen.beginPath();
       for (let i = 1; i < points.length; i++) {
+        if (!points[i] || !points[i - 1]) continue;
         const depth = Math.floor((points[i][2] / 3.6 + 0.5) * bands);
         if (Math.min(bands - 1, Math.max(0, depth)) !== band) continue;
-        if (data.joined) {
+        if (joined) {
           pen.moveTo(points[i - 1][0], points[i - 1][1]);
           pen.lineTo(points[i][0], points[i][1]);
         } else {
           pen.rect(points[i][0] - 0.8, points[i][1] - 0.8, 1.6, 1.6);
         }
       }
-      if (data.joined) pen.stroke(); else pen.fill();
+      if (joined) pen.stroke(); else pen.fill();
     }
     pen.globalAlpha = 1;
   }
@@ -104,11 +124,18 @@ if (document.getElementById("viewer")) {
     pen.setTransform(scale, 0, 0, scale, 0, 0);
     const chosen = axes(), { middle, half, reach } = frame(chosen), row = Number(element("viewer-time").value);
     drawBox(chosen, reach);
-    const at = (c, i) => placed(chosen.map((a, k) => (value(c, a, i) - middle[k]) / half[k]));
+    const at = (given) => placed(given.map((v, k) => (v - middle[k]) / half[k]));
+    if (data.leaf && chosen.every((a) => data.axes.includes(a)) && new Set(chosen).size === 3) {
+      const [first, ...others] = chosen.map((a) => data.leaf[data.axes.indexOf(a)].map((i) => scaled(a, i)));
+      const gap = data.leaf[0].map((i) => i === null);
+      const net = first.map((v, i) => (gap[i] ? null : at([v, ...others.map((o) => o[i])])));
+      drawCurve(net, getComputedStyle(canvas).color, 0.6, [0.2, 0.8], true);
+    }
     for (let c = data.curves.length - 1; c >= 0; c--) {
       if (!boxes[c].checked) continue;
-      drawCurve(c, data.curves[c][0].map((_, i) => at(c, i)));
-      const [x, y] = at(c, sameTime(c, row));
+      const point = (i) => at(chosen.map((a) => value(c, a, i)));
+      drawCurve(data.curves[c][0].map((_, i) => point(i)), colour(c), 1.2, [0.3, 1], data.joined);
+      const [x, y] = point(sameTime(c, row));
       pen.beginPath();
       pen.arc(x, y, 4.5, 0, 7);
       pen.fill();

@@ -132,7 +132,7 @@ def test_a_wrong_statement_stands_out():
     groups = {"Poisson tensor": (Statement("A <b>", PROVED), Statement("C_1 = 1e-16", CHECKED, "8 points"))}
     text = pages.document(Material(Examination(compilation.spec, groups, compilation), compilation, ""))
     assert "1 of 2" in text
-    assert "C<sub>1</sub> = 1·10<sup>−16</sup>" in text
+    assert "C<sub>1</sub> = 1·10⁻¹⁶" in text
     assert "A &lt;b&gt;" in text
 
 
@@ -158,7 +158,7 @@ def test_numbers_to_read(value, shown):
 
 def test_typeset_escapes_and_writes_formulas():
     assert page.typeset("<i> S_1 + t^5 S_5, p_x3**2, 1.6e-13, α_i & a_b") == (
-        "&lt;i&gt; S<sub>1</sub> + t<sup>5</sup> S<sub>5</sub>, p<sub>x3</sub><sup>2</sup>, 1.6·10<sup>−13</sup>, "
+        "&lt;i&gt; S<sub>1</sub> + t<sup>5</sup> S<sub>5</sub>, p<sub>x3</sub><sup>2</sup>, 1.6·10⁻¹³, "
         "α<sub>i</sub> &amp; a<sub>b</sub>"
     )
 
@@ -182,8 +182,9 @@ def test_figure_keeps_no_style_and_has_ids_of_its_own():
     assert "A &lt;title&gt;" in text
 
 
-def viewer_data(methods):
-    return json.loads(re.search(r'id="viewer-data">(.*?)</script>', str(viewer(methods)))[1])
+def viewer_data(methods, opening=None, casimirs=None):
+    text = str(viewer(methods, opening or {}, casimirs or {}))
+    return json.loads(re.search(r'id="viewer-data">(.*?)</script>', text)[1])
 
 
 def test_viewer_holds_the_curve_to_what_a_screen_shows():
@@ -208,12 +209,35 @@ def test_viewer_is_bounded_and_has_axes_for_every_dimension(dimension, axes):
         assert data["axes"] == axes
 
 
+def test_viewer_shows_the_opening_of_a_run_whose_rows_make_no_line():
+    angle = np.linspace(0, 3000, 1000)
+    far, near = (trajectory(np.column_stack([np.cos(a), np.sin(a), a / 9])) for a in (angle, angle / 200))
+    data = viewer_data({"a": far}, {"a": near})
+    assert data["joined"]
+    assert data["high"][2] == pytest.approx(15 / 9)
+    assert "first part of the run" in viewer({"a": far}, {"a": near}, {})
+    assert "first part of the run" not in viewer({"a": near}, {"a": near}, {})
+
+
+def test_viewer_has_the_leaf_around_the_curve():
+    system, angle = compiled("rigid_body").system, np.linspace(0, 6, 200)
+    x = 2 * np.column_stack([np.cos(angle), 0.6 * np.sin(angle), 0.8 * np.sin(angle)])
+    curve = replace(trajectory(x, system.coordinates), parameters={"I1": 1.0, "I2": 2.0, "I3": 3.0})
+    data = viewer_data({"a": curve}, casimirs=system.casimirs)
+    low, high = np.array(data["low"])[:3], np.array(data["high"])[:3]
+    points = np.array([p for p in zip(*data["leaf"], strict=True) if None not in p]) / data["steps"]
+    assert len(points) > 500
+    assert np.linalg.norm(low + (high - low) * points, axis=1) == pytest.approx(2, abs=2e-3)
+    assert np.max(np.abs([low + 2, high - 2])) < 0.1  # all of the sphere, which the curve does not reach
+    assert viewer_data({"a": curve})["leaf"] is None
+
+
 def test_viewer_ends_where_a_method_broke_down():
     x = np.ones((10, 3)).cumsum(axis=0)
     broken = np.where(np.arange(10)[:, None] < 4, x, np.nan)
     data = viewer_data({"phigen": trajectory(x), "<rk4>": trajectory(broken)})
     assert [len(curve[0]) for curve in data["curves"]] == [10, 4]
-    assert "&lt;rk4&gt;" in viewer({"phigen": trajectory(x), "<rk4>": trajectory(broken)})
+    assert "&lt;rk4&gt;" in viewer({"phigen": trajectory(x), "<rk4>": trajectory(broken)}, {}, {})
 
 
 def test_no_name_ends_the_data_of_the_viewer():

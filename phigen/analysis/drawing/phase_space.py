@@ -75,7 +75,7 @@ def draw_in_plane(axes: Any, names: Group, points: Floats) -> None:
 
 def draw_in_space(axes: Any, names: Group, points: Floats, leaf: Leaf | None, zoom: float) -> None:
     """A curve (rows, 3) over the net of its leaf, paler towards the back, and where it starts."""
-    box = around(leaf, _box(points)) if leaf else _box(points)
+    box = around(leaf, box_of(points)) if leaf else box_of(points)
     # The same unit of length along all axes, unless a coordinate would be squeezed flat.
     size = box[1] - box[0]
     axes.set_box_aspect(size if size.max() < 2.2 * size.min() else (1, 1, 1), zoom=zoom)
@@ -184,7 +184,7 @@ def _draw_image(figure: FigureBase, names: Group, t: Floats, x: Floats) -> None:
     figure.colorbar(shown, ax=axes, pad=0.02)
 
 
-def _box(points: Floats) -> Floats:
+def box_of(points: Floats) -> Floats:
     """Bounds (2, 3) around points with a margin; flat in no direction, unless that has a scale of its own."""
     low, high, most = points.min(axis=0), points.max(axis=0), np.max(np.abs(points), axis=0)
     size = high - low
