@@ -16,7 +16,7 @@ from phigen.cli.tune_summary import described, print_tuning, unreached
 from phigen.errors import CheckError
 
 if TYPE_CHECKING:
-    from phigen.analysis.tuning.trials import Problem
+    from phigen.analysis.tuning.problem import Problem
     from phigen.cli.experiment import Experiment
     from phigen.geometry.system import System
 
@@ -107,7 +107,7 @@ def problem_of(system: System, experiment: Experiment, horizon: float | None) ->
     """The initial value problem of an experiment, over its own duration unless another is given."""
     import numpy as np
 
-    from phigen.analysis.tuning.trials import Problem
+    from phigen.analysis.tuning.problem import Problem
 
     run = experiment.run
     step = float(run.step)

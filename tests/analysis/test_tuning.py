@@ -12,19 +12,13 @@ from support import NAMES, compiled, described, plain
 from phigen import resources, spec
 from phigen.analysis.tuning import search
 from phigen.analysis.tuning.building import Built, Refusal, build, build_all
+from phigen.analysis.tuning.problem import Problem
 from phigen.analysis.tuning.references import agreed, orbit_error
 from phigen.analysis.tuning.search import Curve, cheapest_step, proposals, scan, step_for
 from phigen.analysis.tuning.settings import OWN, SPLITTING, Setting, charts, own_setting, variants
 from phigen.analysis.tuning.study import Finalist, ranking
-from phigen.analysis.tuning.trials import (
-    MARKS,
-    Point,
-    Problem,
-    energy_measure,
-    marks,
-    nanoseconds_per_step,
-    orbit_measure,
-)
+from phigen.analysis.tuning.timing import nanoseconds_per_step
+from phigen.analysis.tuning.trials import MARKS, Point, energy_measure, marks, orbit_measure
 from phigen.analysis.tuning.tuner import expected_seconds
 from phigen.compiler import compile_spec, emit
 from phigen.errors import CheckError

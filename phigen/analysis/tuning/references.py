@@ -9,7 +9,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from phigen.analysis.arrays import Floats
-from phigen.analysis.tuning.trials import MARKS, Method
+from phigen.analysis.tuning.problem import Method
+from phigen.analysis.tuning.trials import MARKS
 from phigen.errors import CheckError
 
 #: Steps are halved until that changes no more than this part of the accuracy.

@@ -8,9 +8,11 @@ from dataclasses import dataclass, field, replace
 from statistics import median
 
 from phigen.analysis.tuning import search
+from phigen.analysis.tuning.problem import Problem, steps_in
 from phigen.analysis.tuning.search import Curve
 from phigen.analysis.tuning.settings import Setting
-from phigen.analysis.tuning.trials import Point, Problem, nanoseconds_per_step, steps_in
+from phigen.analysis.tuning.timing import nanoseconds_per_step
+from phigen.analysis.tuning.trials import Point
 from phigen.analysis.tuning.tuner import Clock, Notify, Tuner
 from phigen.compiler import Compilation
 

@@ -7,29 +7,15 @@ import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 
-import numpy as np
-
 from phigen.analysis import race
-from phigen.analysis.arrays import Floats
 from phigen.analysis.tuning import search
 from phigen.analysis.tuning.building import Built, Outcome, Refusal, build_all, built
+from phigen.analysis.tuning.problem import Candidate, Classical, Method, Problem, steps_in
 from phigen.analysis.tuning.references import Reference, agreed, orbit_error
+from phigen.analysis.tuning.scales import scales
 from phigen.analysis.tuning.search import Curve
 from phigen.analysis.tuning.settings import Setting, charts, direct, own_setting
-from phigen.analysis.tuning.trials import (
-    LINEAR,
-    Candidate,
-    Classical,
-    Measure,
-    Method,
-    Point,
-    Problem,
-    energy_measure,
-    marks,
-    nanoseconds_per_step,
-    orbit_measure,
-    steps_in,
-)
+from phigen.analysis.tuning.trials import LINEAR, Measure, Point, energy_measure, marks, orbit_measure
 from phigen.api import chosen_target, solver_of
 from phigen.compiler import Compilation
 from phigen.errors import CheckError, StepError
@@ -37,11 +23,6 @@ from phigen.errors import CheckError, StepError
 #: The share of the budget after which nothing more is built, that which one round of building may take, that which a
 #: first guess may be expected to take, and that of one scan and of one reference solution.
 SEARCHING, BUILDING, GUESSING, SCANNING, REFERRING = 0.65, 0.2, 0.1, 0.1, 0.05
-#: A scan measures over so many steps of the run's size at most, and over so many seconds of CPU time.
-PIECE_STEPS, PIECE_SECONDS = 20_000, 0.02
-#: A step turns the fastest motion by this angle at most: fewer than three steps in a turn show no motion. And there
-#: are at least so many.
-MOST_TURN, LEAST_STEPS = 2.0, 24
 #: What the accuracy may cost a candidate relative to the best so far, and a classical method.
 WORTH, WORTH_KNOWING = 4.0, 100.0
 #: Classical methods beside which the result is shown: their names in tables, and orders.
@@ -263,31 +244,6 @@ def _expect_linear(measure: Measure, method: Method, problem: Problem, piece: fl
                 )
             return
         h = h / 2 if point is None or point.measured > 1e-3 else 2 * h
-
-
-def scales(problem: Problem, method: Candidate) -> tuple[float, float]:
-    """The time over which candidates are scanned, and the largest step that shows the motion."""
-    h = problem.step
-    few = steps_in(min(problem.horizon, 500 * h), h)
-    states = method.rows(h, few, max(1, few // 16))
-    if states is None:
-        return problem.horizon, problem.horizon / LEAST_STEPS
-    nanoseconds = nanoseconds_per_step(method, h, few)
-    steps = min(max(1e9 * PIECE_SECONDS / nanoseconds, 500), PIECE_STEPS)
-    rate = fastest_rate(lambda x: method.solver.vector_field(x, problem.parameters), states)
-    return min(problem.horizon, steps * h), min(MOST_TURN / max(rate, 1e-300), problem.horizon / LEAST_STEPS)
-
-
-def fastest_rate(field: Callable[[Floats], Floats], states: Floats) -> float:
-    """The largest absolute eigenvalue of the derivative of the vector field at some states (rows, DIM)."""
-    size = float(np.max(np.abs(states))) or 1.0
-    width, rate = 1e-6 * size, 0.0
-    for x in states:
-        moves = width * np.eye(len(x))
-        jacobian = (field(x + moves) - field(x - moves)).T / (2 * width)
-        if np.isfinite(jacobian).all():
-            rate = max(rate, float(np.max(np.abs(np.linalg.eigvals(jacobian)))))
-    return rate
 
 
 def expected_seconds(setting: Setting, tried: Iterable[Curve]) -> float:
