@@ -30,6 +30,7 @@ COMMANDS = {
     "show": ("phigen.cli.show", "Show the formulas: π, Casimirs, α, β, S_1 … S_k."),
     "list": ("phigen.cli.list", "List the bundled specs."),
     "schema": ("phigen.cli.schema", "Print the JSON Schema of specs, for editors."),
+    "reproduce": ("phigen.cli.reproduce", "Make the figures of the paper, with the numbers measured."),
     "demo": ("phigen.cli.demo", "Compile and run the paper's Lotka–Volterra system."),
 }
 

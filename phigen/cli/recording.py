@@ -62,7 +62,7 @@ class Recorder:
         self.points = Thinned(1 + names.dimension, POINTS)
         self.finder = None
         if run.section is not None:
-            self.finder = CrossingFinder(function_of(run.section, names.coordinates, parameters), experiment.h)
+            self.finder = CrossingFinder[Session](function_of(run.section, names.coordinates, parameters), experiment.h)
         self.identity = {
             "phigen": __version__,
             "spec": compilation.spec.source_sha256,

@@ -11,12 +11,15 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
+from typing import Generic, TypeVar
 
 import numpy as np
 
 from phigen.runtime.interface import BackendError, Floats
-from phigen.runtime.session import Session
+from phigen.runtime.session import Course
 from phigen.runtime.tables import Column, write
+
+C = TypeVar("C", bound=Course)
 
 #: A function of states (rows, DIM), shape (rows,).
 Function = Callable[[Floats], Floats]
@@ -57,7 +60,7 @@ def section_columns(coordinates: tuple[str, ...]) -> list[Column]:
 
 
 @dataclass
-class CrossingFinder:
+class CrossingFinder(Generic[C]):
     """Follows a session in steps of size h and finds where g rises through zero as time increases.
 
     An interval between two steps has one crossing at most. Where g has an extremum near a step and one sign around it,
@@ -68,11 +71,11 @@ class CrossingFinder:
 
     g: Function
     h: float
-    past: list[Session] = field(default_factory=list)
+    past: list[C] = field(default_factory=list)
     values: list[float] = field(default_factory=list)
 
     def follow(
-        self, session: Session, steps: int, move: Callable[[], object]
+        self, session: C, steps: int, move: Callable[[], object]
     ) -> Iterator[tuple[Floats, list[tuple[float, Floats]]]]:
         """Blocks of the states (rows, DIM) after each step that ``move`` made, and the crossings (t, x) before them.
 
@@ -104,7 +107,7 @@ class CrossingFinder:
         # A section is crossed where g rises in time, whether time goes forwards or backwards.
         return math.copysign(1.0, self.h) * np.asarray(self.g(states), dtype=np.float64)
 
-    def _value(self, session: Session) -> float:
+    def _value(self, session: C) -> float:
         return float(self._values(session.state()[np.newaxis])[0])
 
     def _crossings(self, latest: int, known: int) -> Iterator[tuple[float, Floats]]:
@@ -159,7 +162,7 @@ class CrossingFinder:
     def _at(self, j: int, fraction: float, substeps: Sequence[int] = SUBSTEPS) -> float:
         return self._value(self._moved(j, fraction, substeps))
 
-    def _moved(self, j: int, fraction: float, substeps: Sequence[int]) -> Session:
+    def _moved(self, j: int, fraction: float, substeps: Sequence[int]) -> C:
         """A solver that went a fraction of step j, in the first number of equal steps that works."""
         for count in substeps:
             session = self.past[j].branch()

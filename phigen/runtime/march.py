@@ -35,7 +35,7 @@ def march(
     h: float,
     steps: int,
     stride: int,
-    finder: CrossingFinder | None = None,
+    finder: CrossingFinder[Session] | None = None,
     see_tangent: Callable[[Floats], None] | None = None,
 ) -> Iterator[Piece]:
     """Go on with a session until ``steps`` steps of size h are made, storing every ``stride``-th state and the last.
@@ -74,7 +74,7 @@ def _states(
     h: float,
     target: int,
     stride: int,
-    finder: CrossingFinder | None,
+    finder: CrossingFinder[Session] | None,
     see_tangent: Callable[[Floats], None] | None,
 ) -> Iterator[tuple[int, Sequence[Floats] | Floats, list[tuple[float, Floats]]]]:
     """The number of a step, its state and those of the steps after it, and crossings; no stored state is left out."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import Protocol, Self
 
 import numpy as np
 
@@ -12,11 +12,10 @@ from phigen.runtime.interface import BackendError, Floats, Progress, row_steps
 _REPORTS = 200
 
 
-class Session(Protocol):
-    """A trajectory being computed: its state, and all that the next step depends on.
+class Course(Protocol):
+    """A trajectory being computed, by whatever method: its state, and all that the next step depends on.
 
-    Steps are those of one integration, to the last bit, however they are split into calls. A failing step raises
-    `BackendError` and leaves the state before it.
+    A failing step raises `BackendError` and leaves the state before it.
     """
 
     @property
@@ -32,12 +31,19 @@ class Session(Protocol):
         """Make so many steps."""
         ...
 
-    def advance_tangent(self, h: float) -> Floats:
-        """Make one step; its derivative (DIM, DIM). Raises `MissingExtraError` without the extra ``tangent``."""
+    def branch(self) -> Self:
+        """An independent copy."""
         ...
 
-    def branch(self) -> Session:
-        """An independent copy."""
+
+class Session(Course, Protocol):
+    """A trajectory being computed by a generated solver.
+
+    Steps are those of one integration, to the last bit, however they are split into calls.
+    """
+
+    def advance_tangent(self, h: float) -> Floats:
+        """Make one step; its derivative (DIM, DIM). Raises `MissingExtraError` without the extra ``tangent``."""
         ...
 
     def saved(self) -> bytes:
@@ -45,7 +51,7 @@ class Session(Protocol):
         ...
 
 
-def rows_along(session: Session, h: float, steps: int, stride: int, progress: Progress | None) -> Floats:
+def rows_along(session: Course, h: float, steps: int, stride: int, progress: Progress | None) -> Floats:
     """States (rows, DIM) after 0, stride, 2·stride, … steps and the last, of a session that stands at its start.
 
     Raises `BackendError`, whose rows end with the last good state.

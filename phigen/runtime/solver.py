@@ -139,7 +139,7 @@ class Solver:
         values = self._parameters(parameters, more)
         start, h, steps = self._state(x0, "x0"), _step_size(h), _count(steps, "steps", 0)
         found: list[tuple[float, Floats]] = []
-        finder = CrossingFinder(g, h)
+        finder = CrossingFinder[Session](g, h)
         try:
             session = self.backend.start(start, values)
             for _, crossings in finder.follow(session, steps, lambda: session.advance(h, 1)):

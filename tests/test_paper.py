@@ -1,0 +1,90 @@
+"""docs/paper.md: its numbers and figures are those of today, and its commands do what it says."""
+
+import json
+import math
+import re
+import shutil
+from functools import cache
+from pathlib import Path
+
+import click
+import pytest
+from click.testing import CliRunner
+from walkthrough import follow
+
+pytest.importorskip("matplotlib")
+pytestmark = pytest.mark.skipif(not shutil.which("cc"), reason="needs a C compiler")
+
+from phigen.analysis.drawing.palette import svg  # noqa: E402
+from phigen.analysis.paper import rigid_body  # noqa: E402
+from phigen.analysis.paper.plate import Plate  # noqa: E402
+from phigen.analysis.paper.plates import PLATES  # noqa: E402
+from phigen.cli import group  # noqa: E402
+from phigen.cli.reproduce import described, lines_of  # noqa: E402
+
+DOCS = Path(__file__).resolve().parent.parent / "docs"
+STORED = {entry["figure"]: entry for entry in json.loads((DOCS / "figures" / "paper.json").read_text())}
+
+
+@cache
+def made(name: str) -> Plate:
+    """A figure of today; of the long run its first hundredth."""
+    return rigid_body.errors_plate(rigid_body.EARLY) if name == "rigid_body" else PLATES[name]()
+
+
+def words(text):
+    """The labels of an SVG file but the numbers along its axes."""
+    found = re.findall(r"<text[^>]*>([^<]*)</text>", text)
+    return [label for label in found if not re.fullmatch(r"[−\d.]*", label)]
+
+
+@pytest.mark.parametrize("name", PLATES)
+def test_numbers_are_current(name):
+    stored = {f["quantity"]: f for f in STORED[name]["findings"]}
+    today = described({name: made(name)})[0]["findings"]
+    assert [f["quantity"] for f in today if f["quantity"] not in stored] == []
+    for finding in today:
+        before, now = stored[finding["quantity"]], finding["measured"]
+        assert before["paper"] == finding["paper"]
+        # What is round-off differs from compiler to compiler.
+        roundoff = abs(now) < 1e-9 and abs(before["measured"]) < 1e-9
+        assert roundoff or math.isclose(now, before["measured"], rel_tol=0.01), finding
+
+
+def test_long_run_goes_on_as_it_began():
+    found = {f["quantity"]: f["measured"] for f in STORED["rigid_body"]["findings"]}
+    for quantity in ("energy, RK4: error at", "Casimir, RK4: error at"):
+        assert found[f"{quantity} t = 10000"] == pytest.approx(100 * found[f"{quantity} t = 100"], rel=0.01)
+    amplitude = "energy, PHI-2: largest error up to"
+    assert found[f"{amplitude} t = 10000"] == pytest.approx(found[f"{amplitude} t = 100"], rel=0.01)
+    assert found["Casimir, PHI-2: largest error up to t = 10000"] < 1e-13
+
+
+@pytest.mark.parametrize("name", PLATES)
+def test_figures_are_current_and_small(name):
+    path = DOCS / "figures" / f"{name}.svg"
+    assert path.stat().st_size < 150_000
+    assert words(path.read_text()) == words(svg(made(name).figure))
+
+
+def test_tables_are_those_of_the_measurement():
+    text = (DOCS / "paper.md").read_text(encoding="utf-8")
+    for entry in STORED.values():
+        assert click.unstyle("\n".join(lines_of([entry]))) in text, entry["figure"]
+
+
+def test_page_can_be_followed(tmp_path):
+    assert follow(DOCS / "paper.md", tmp_path) == 5
+
+
+def test_command_makes_one_figure_and_refuses_unknown_ones(tmp_path):
+    runner = CliRunner()
+    done = runner.invoke(
+        group, ["reproduce", "paper", "-o", str(tmp_path), "--figure", "singularity", "--format", "png"]
+    )
+    assert done.exit_code == 0, done.output
+    assert [p.name for p in tmp_path.iterdir()] == ["singularity.png"]
+    assert "T_sing" in done.stdout
+    wrong = runner.invoke(group, ["reproduce", "paper", "-o", str(tmp_path), "--figure", "tori"])
+    assert wrong.exit_code == 2
+    assert "no figure 'tori'" in wrong.stderr
