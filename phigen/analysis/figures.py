@@ -11,7 +11,9 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from phigen.analysis.arrays import Floats
+from phigen.analysis.backward import Constancy
 from phigen.analysis.drawing import (
+    backward_curves,
     error_curves,
     exponents,
     phase_space,
@@ -30,8 +32,9 @@ if TYPE_CHECKING:
     from phigen.analysis.lyapunov import Spectrum
     from phigen.analysis.tuning.study import Tuning
 
-__all__ = ["PALETTE", "SUFFIXES", "WIDTH", "convergence_figure", "error_figure", "lyapunov_figure", "run_figure",
-           "save", "section_figure", "svg", "trajectory_figure", "tuning_figure", "work_precision_figure"]  # fmt: skip
+__all__ = ["PALETTE", "SUFFIXES", "WIDTH", "constancy_figure", "convergence_figure", "error_figure",
+           "lyapunov_figure", "run_figure", "save", "section_figure", "svg", "trajectory_figure", "tuning_figure",
+           "work_precision_figure"]  # fmt: skip
 
 #: The widths of a page and of a single panel, in inches; PNG files have 200 dots per inch.
 WIDTH, NARROW = 7.2, 4.8
@@ -96,6 +99,16 @@ def tuning_figure(found: Tuning, title: str = "") -> Figure:
     if title:
         figure.suptitle(title, fontsize=11)
     tuning_curves.draw_tuning(figure.add_subplot(), found)
+    return figure
+
+
+@styled
+def constancy_figure(found: Constancy) -> Figure:
+    """How constant H and the modified Hamiltonian are: along a trajectory, and against the step size."""
+    figure = _figure(_SQUARE)
+    along, against = figure.subplots(1, 2)
+    backward_curves.draw_along(along, found)
+    backward_curves.draw_against_step(against, found)
     return figure
 
 

@@ -13,13 +13,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from phigen.analysis import measures
-from phigen.analysis.arrays import Floats, evaluate
+from phigen.analysis import backward, measures
+from phigen.analysis.arrays import Floats
 from phigen.analysis.methods import Method, of_classical, of_solver
 from phigen.compiler import Compilation
-from phigen.errors import LimitError, StepError
+from phigen.errors import StepError
 from phigen.runtime.solver import Solver
-from phigen.scheme.modified import corrections, powers
 
 #: Observed orders may fall short of the stated one by this much.
 ORDER_SLACK = 0.3
@@ -31,8 +30,6 @@ DIFFERENCES = 1e-7
 GROWTH = 4.0
 #: Steps of a run that are made at most, and with --quick.
 MOST_STEPS, FEW_STEPS = 20_000, 2_000
-#: Corrections of the modified Hamiltonian, and the largest order of a method for which they are computed.
-CORRECTIONS, MODIFIED_ORDER = 2, 6
 #: States along the run at which single steps are examined.
 STATES = 4
 
@@ -322,41 +319,16 @@ def agreement_check(subject: Subject, states: Sequence[Floats]) -> Check:
 
 def modified_checks(subject: Subject, gauge: Floats | None) -> Iterator[Check]:
     """The modified Hamiltonian with m corrections is constant to order p + m, or p + 2m of a symmetric method."""
-    compilation, solver = subject.compilation, subject.main
-    symmetric, system = compilation.symmetric, compilation.system
-    if (
-        compilation.splitting
-        or len(compilation.program.fractions) > 1
-        or not subject.exact
-        or compilation.order.order > MODIFIED_ORDER
-    ):
-        return
     try:
-        found = corrections(system, compilation.chart, compilation.order, CORRECTIONS, compilation.gauge)
-    except LimitError:
+        found = backward.modified(subject.compilation, subject.parameters, gauge)
+    except backward.NotOfferedError:
         return
-    listed = powers(compilation.order, CORRECTIONS + 1, symmetric=symmetric)
-    scales, h = (1.0, 0.5), 2 * subject.h
-    spreads: dict[float, list[float]] = {}
-    for scale in scales:
-        try:
-            rows = solver.rows(subject.start, scale * h, round(16 / scale), 1)
-        except StepError:
-            return
-        values = {**subject.parameters, **{c: rows[:, i] for i, c in enumerate(system.coordinates)}}
-        if gauge is not None and compilation.gauge is not None:
-            values |= dict(zip(compilation.gauge.symbols, np.ravel(gauge), strict=True))
-        terms = evaluate([found.tower.expression(t) for t in found.terms], values)
-        sums = [sum((scale * h) ** j * term for j, term in enumerate(terms[:p])) for p in listed]
-        size = measures.size_of(system.hamiltonian, system.coordinates, values)
-        spreads[scale] = [float(np.ptp(s)) / size for s in sums]
-    for k, power in enumerate(listed[1:], 1):
-        coarse, fine = (spreads[s][k] for s in scales)
-        observed = math.log2(coarse / fine) if fine > 1e-14 else math.inf
+    observed = backward.observed_powers(found, subject.main, subject.start, subject.h)
+    for m, (power, shown) in enumerate(zip(found.powers[1:], observed[1:], strict=True), 1):
         limit = power - 2 * ORDER_SLACK
-        reason = f"shrinks like h^{observed:.2f} instead of h^{power}"
-        name = f"modified H, {k} correction{'s' * (k > 1)}: order"
-        yield Check(name, observed, f"at least {limit:.1f}", observed >= limit, reason)
+        reason = f"shrinks like h^{shown:.2f} instead of h^{power}"
+        name = f"modified H, {m} correction{'s' * (m > 1)}: order"
+        yield Check(name, shown, f"at least {limit:.1f}, stated {power}", shown >= limit, reason)
 
 
 def step_check(subject: Subject, states: Sequence[Floats]) -> Check:

@@ -10,7 +10,7 @@ from phigen.cli.console import Console
 from phigen.cli.experiment import Experiment, loaded
 from phigen.cli.interruption import InterruptedRunError
 from phigen.cli.report_study import COMPARED, environment, studied
-from phigen.errors import PhigenError
+from phigen.errors import PhigenError, StepError
 from phigen.report.material import Material
 
 if TYPE_CHECKING:
@@ -46,6 +46,7 @@ def gathered(
         from phigen.cli.verify import fallen_short
 
         failures.append(fallen_short(verification))
+    material = _with_constancy(material, experiment)
     study, note = studied(compilation, experiment, quick, console)
     notes = (*material.notes, note) if note else material.notes
     where = environment() if study else {}
@@ -99,6 +100,27 @@ def _opening(
     record(recorder, console)
     beside = {method: compared(compilation, solver, first, method, console)[1] for method in others}
     return {recorder.label: recorder.trajectory(False), **beside}
+
+
+def _with_constancy(material: Material, experiment: Experiment) -> Material:
+    """With the constancy of the modified Hamiltonian, or why it was not measured."""
+    import numpy as np
+
+    from phigen.analysis import backward
+    from phigen.analysis.methods import of_solver
+    from phigen.analysis.verification import gauge_at
+    from phigen.api import chosen_target, solver_of
+
+    compilation, parameters, x0 = material.compilation, experiment.parameters, np.array(experiment.initial)
+    try:
+        gauge = gauge_at(compilation, x0, parameters)
+        found = backward.modified(compilation, parameters, gauge)
+        method = of_solver(solver_of(compilation, chosen_target("auto")), parameters, gauge)
+        return replace(material, constancy=backward.constancy(found, method, x0, experiment.h))
+    except backward.NotOfferedError as error:
+        return replace(material, no_constancy=str(error))
+    except StepError as error:
+        return replace(material, no_constancy=f"a step failed: {error}")
 
 
 def _verified(compilation: Compilation, experiment: Experiment, quick: bool, console: Console) -> Verification:

@@ -12,6 +12,7 @@ from phigen.report import evidence, page
 from phigen.report.drawable import NO_FIGURES, drawable
 from phigen.report.material import Material
 from phigen.report.method import method_section
+from phigen.report.modified import modified_section
 from phigen.report.precision import precision_section
 from phigen.report.system import system_section
 from phigen.report.viewer import viewer
@@ -42,6 +43,7 @@ def _sections(material: Material) -> Iterator[tuple[str, str, Markup]]:
     yield "proofs", "What was proved", evidence.proofs_section(material)
     if material.verification:
         yield "measured", "What was measured", evidence.measured_section(material.verification)
+        yield "modified", "The modified Hamiltonian", modified_section(material.constancy, material.no_constancy)
     if material.methods:
         yield "run", "A run", page.joined(_run(material))
     if material.study:

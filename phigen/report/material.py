@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from phigen.analysis.arrays import Floats
+from phigen.analysis.backward import Constancy
 from phigen.analysis.lyapunov import Spectrum
 from phigen.analysis.precision import Study
 from phigen.analysis.proof import Examination
@@ -23,6 +24,7 @@ class Material:
     ``methods`` are trajectories by their labels, the solver's first, ``opening`` every step of the first ones
     if the run is longer. ``section`` is what its Poincaré section is the
     zero of, some of its points (rows, DIM), and how many there are; ``spectrum`` are its Lyapunov exponents.
+    ``constancy`` is that of the modified Hamiltonian; ``no_constancy`` says why there is none.
     ``environment`` says what the times depend on. ``command`` makes the page again.
     """
 
@@ -36,6 +38,8 @@ class Material:
     section: tuple[str, Floats, int] | None = None
     spectrum: Spectrum | None = None
     verification: Verification | None = None
+    constancy: Constancy | None = None
+    no_constancy: str = ""
     study: Study | None = None
     environment: Mapping[str, str] = field(default_factory=dict)
     notes: tuple[str, ...] = ()

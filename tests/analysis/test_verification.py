@@ -9,7 +9,7 @@ from click.testing import CliRunner
 from support import BODY
 
 from phigen import spec
-from phigen.analysis import measures, verification
+from phigen.analysis import backward, measures, verification
 from phigen.analysis.methods import by_differences, of_classical, of_solver
 from phigen.api import solver_of
 from phigen.cli import group
@@ -54,7 +54,7 @@ def test_modified_hamiltonian_is_constant_to_higher_order_for_each_correction():
     compilation = compilation_of()
     found = verified(compilation, {"c": solver_of(compilation, "c")})
     orders = {c.name: c.value for c in found.checks if c.name.startswith("modified")}
-    assert len(orders) == verification.CORRECTIONS
+    assert len(orders) == backward.CORRECTIONS
     assert orders["modified H, 1 correction: order"] == pytest.approx(6, abs=0.2)
 
 

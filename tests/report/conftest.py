@@ -20,7 +20,7 @@ description: |
 references: [{QUOTED}, "https://example.org/?a=1&b=<2>"]
 coordinates: [x1, x2, alert]
 parameters:
-  I1: {{value: 2, positive: true, description: {QUOTED}}}
+  I1: {{value: 1, positive: true, description: {QUOTED}}}
 poisson:
   brackets: {{x1: {{x2: -alert, alert: x2}}, x2: {{alert: -x1}}}}
 hamiltonian: x1**2/I1/2 + x2**2/4 + alert**2/6

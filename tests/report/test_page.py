@@ -52,9 +52,12 @@ def test_page_is_sound_html_that_loads_nothing(html):
 
 def test_page_has_all_its_sections(html):
     found = [given["id"] for given in Page(html).all("section")]
-    assert found == ["brief", "system", "choices", "method", "proofs", "measured", "run", "precision", "provenance"]
+    assert found == ["brief", "system", "choices", "method", "proofs", "measured", "modified", "run", "precision",
+                     "provenance"]  # fmt: skip
     figures = {given["id"] for given in Page(html).all("figure")}
-    assert figures == {f"figure-{n}" for n in ("trajectory", "errors", "section", "lyapunov", "convergence", "work")}
+    assert figures == {
+        f"figure-{n}" for n in ("constancy", "trajectory", "errors", "section", "lyapunov", "convergence", "work")
+    }
 
 
 def test_texts_of_the_spec_stay_texts(html):

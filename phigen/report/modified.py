@@ -1,0 +1,44 @@
+"""The section about the modified Hamiltonian: that it is as constant as it should be."""
+
+from __future__ import annotations
+
+from math import isfinite
+
+from markupsafe import Markup
+
+from phigen.analysis.backward import Constancy
+from phigen.report import page
+from phigen.report.drawable import drawable
+
+
+def modified_section(found: Constancy | None, why_not: str) -> Markup:
+    """What was measured, in a table and a figure; or why nothing was."""
+    said = (
+        "A step of the solver is the exact flow, over the time h, of a Hamiltonian H̃ near H. So it keeps H̃, and H up "
+        "to the difference: this is why energy oscillates and does not drift. H̃ is a series in h."
+    )
+    if found is None:
+        return page.joined([page.paragraph(said), page.paragraph(f"It was not measured here: {why_not}.", "note")])
+    said += " The more of its terms are taken, the less it changes along the trajectory."
+    rows = [_row(m, found) for m in range(len(found.powers))]
+    columns = [("", "Hamiltonian"), ("", "should change like"), ("", "changes like")]
+    columns.append(("number", f"largest change at steps of {found.step:.4g}"))
+    blocks = [page.paragraph(said), page.table("How constant it is, relative to the energy", columns, rows)]
+    if drawable():
+        from phigen.report import pictures
+
+        blocks.append(pictures.constancy_picture(found))
+    return page.joined(blocks)
+
+
+def label(m: int) -> str:
+    """The truncation with m corrections, for people."""
+    return "H itself" if m == 0 else f"H̃ with {m} correction{'s' * (m > 1)}"
+
+
+def _row(m: int, found: Constancy) -> tuple[str, list[page.Cell]]:
+    observed = (
+        Markup("h<sup>{}</sup>").format(f"{found.observed[m]:.2f}") if isfinite(found.observed[m]) else "rounding"
+    )
+    stated = Markup("h<sup>{}</sup>").format(found.powers[m])
+    return label(m), [("", stated), ("", observed), ("number", page.scientific(float(found.errors[m].max())))]

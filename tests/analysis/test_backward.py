@@ -1,0 +1,65 @@
+"""The modified Hamiltonian is as constant as its truncation allows, and that is measured where it can be seen."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from support import compiled
+
+from phigen import spec
+from phigen.analysis import backward
+from phigen.analysis.methods import of_classical, of_solver
+from phigen.analysis.verification import gauge_at
+from phigen.api import solver_of
+from phigen.compiler import compile_spec
+
+
+def subject(name):
+    """The modified Hamiltonian, method and start of the first run of a system of the corpus."""
+    compilation = compiled(name)
+    run = next(iter(compilation.spec.runs.values()))
+    values = {p.name: float(run.parameters.get(p.name, p.value)) for p in compilation.spec.parameters}
+    x = np.array([float(v) for v in run.initial])
+    gauge = gauge_at(compilation, x, values)
+    method = of_solver(solver_of(compilation, "c"), values, gauge)
+    return backward.modified(compilation, values, gauge), method, x, float(run.step)
+
+
+@pytest.mark.parametrize("name", ["rigid_body", "predator_prey"])
+def test_each_correction_makes_the_modified_hamiltonian_two_orders_more_constant(name):
+    found, method, x, h = subject(name)
+    measured = backward.constancy(found, method, x, h)
+    assert measured.powers == (found.powers[0], found.powers[0] + 2, found.powers[0] + 4)
+    assert measured.observed == pytest.approx(measured.powers, abs=0.3)
+    assert (measured.errors.max(axis=1)[1:] < 0.3 * measured.errors.max(axis=1)[:-1]).all()
+    assert measured.times[-1] == pytest.approx(backward.SHOWN * measured.step)
+
+
+def test_wrong_corrections_are_noticed():
+    found, method, x, h = subject("predator_prey")
+    p, q = found.powers[:2]
+    wrong = replace(found, terms=tuple(2 * t if p <= j < q else t for j, t in enumerate(found.terms)))
+    assert backward.observed_powers(wrong, method, x, h)[1] < p + 0.5
+
+
+def test_another_method_does_not_keep_it():
+    found, _, x, h = subject("predator_prey")
+    rk4 = of_classical("rk4", solver_of(compiled("predator_prey"), "numpy"), dict(found.values))
+    assert backward.observed_powers(found, rk4, x, h)[1] < 5.5
+
+
+def test_what_is_conserved_exactly_tells_no_order():
+    found, method, x, h = subject("harmonic_oscillator")
+    assert backward.observed_powers(found, method, x, h) == [np.inf] * 3
+    with pytest.raises(backward.NotOfferedError, match="rounding"):
+        backward.constancy(found, method, x, h)
+
+
+@pytest.mark.parametrize(
+    ("options", "why"), [("order: 8", "orders up to 6"), ("order: 6\ncomposition: kahan-li", "several maps")]
+)
+def test_where_it_is_not_offered_it_says_why(options, why):
+    text = "phigen: 1\nname: t\ncoordinates: [q, p]\npoisson: {canonical: {q: [q], p: [p]}}\n"
+    compilation = compile_spec(spec.loads(f"{text}hamiltonian: p**2/2 - cos(q)\nbirealisation: constant\n{options}\n"))
+    with pytest.raises(backward.NotOfferedError, match=why):
+        backward.modified(compilation, {}, None)
