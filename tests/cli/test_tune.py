@@ -25,7 +25,7 @@ def paste(source, found):
 
 def test_pasted_lines_reach_the_accuracy_at_the_proposed_step(phigen, in_tmp):
     path = SPECS / "henon_heiles.yaml"
-    done = phigen("tune", path, "--accuracy", "1e-6", "--horizon", "500", "--budget", "6", "--json", "--plot", "w.svg")
+    done = phigen("tune", path, "--accuracy", "1e-6", "--horizon", "500", "--budget", "4", "--json", "--plot", "w.svg")
     assert done.exit_code == 0, done.stderr
     found = json.loads(done.stdout)
     best = found["winner"]

@@ -1,0 +1,66 @@
+"""The settings of docs/choosing.md have the errors that it says; its commands work."""
+
+import re
+import shlex
+import shutil
+from functools import cache
+
+import numpy as np
+import pytest
+from support import described
+
+from phigen import resources
+from phigen.analysis.tuning.building import build
+from phigen.analysis.tuning.problem import Candidate, Problem
+from phigen.analysis.tuning.settings import SPLITTING, Setting
+from phigen.analysis.tuning.trials import energy_measure
+
+DOCS = resources.bundled_specs().parent / "docs"
+TEXT = (DOCS / "choosing.md").read_text(encoding="utf-8")
+
+pytestmark = pytest.mark.skipif(not shutil.which("cc"), reason="runs compiled C")
+
+
+def rows(heading):
+    """The cells of the table under a heading."""
+    section = TEXT.split(f"\n## {heading}\n")[1].split("\n## ")[0]
+    lines = [line for line in section.splitlines() if line.startswith("| ")]
+    return [[cell.strip(" `") for cell in line.strip("|").split("|")] for line in lines[1:]]
+
+
+def energy_error(name, kind, order, step, gauge="auto"):
+    """The largest relative error of the energy of the first run up to t = 10,000."""
+    made = built(name, Setting(kind, int(order), gauge, "auto" if kind == SPLITTING else "none"))
+    spec, system, _ = described(name)
+    run = next(iter(spec.runs.values()))
+    values = {p.name: float(run.parameters.get(p.name, p.value)) for p in spec.parameters}
+    problem = Problem(system, np.array([float(v) for v in run.initial]), values, float(step), 1e4)
+    return energy_measure(problem)(Candidate(made.solver(), problem), float(step), 1e4).measured
+
+
+@cache
+def built(name, setting):
+    spec, system, _ = described(name)
+    return build(spec, system, setting)
+
+
+@pytest.mark.parametrize("row", rows("Energy up to t = 100,000"), ids=lambda row: "-".join(row[:2]))
+def test_proposed_settings_reach_their_accuracy_and_hardly_more(row):
+    name, accuracy, kind, order, step, *_ = row
+    assert 0.03 < energy_error(name, kind, order, step) / float(accuracy) <= 1
+
+
+@pytest.mark.parametrize("row", rows("What each choice does"), ids=lambda row: "-".join(row[:3]))
+def test_steps_for_one_accuracy(row):
+    kind, order, gauge, step, _ = row
+    assert 0.3 < energy_error("rigid_body", kind, order, step, gauge) / 1e-8 < 3
+
+
+def test_commands_work(phigen, in_tmp):
+    commands = re.findall(r"(?m)^phigen (tune tumbler.yaml .*)$", TEXT)
+    assert len(commands) == 2
+    phigen("new", "tumbler")
+    for command in commands:
+        done = phigen(*shlex.split(command), "--budget", "1")
+        assert done.exit_code == 0, done.stderr
+        assert "To paste into the spec" in done.stdout
