@@ -308,7 +308,7 @@ def agreement_check(subject: Subject, states: Sequence[Floats]) -> Check:
     """Single steps of all targets from the same states."""
     name, difference = "agreement of " + " and ".join(subject.own), 0.0
     if len(subject.own) < 2:
-        return Check(f"only one target: {subject.main.name}", math.nan)
+        return Check(f"agreement: only one target, {subject.main.name}", math.nan)
     for x in states:
         images = [m.step(x, subject.h) for m in subject.own.values()]
         size = float(np.max(np.abs(images[0])))

@@ -9,6 +9,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from markupsafe import Markup
 
 from phigen.analysis.lyapunov import Spectrum
+from phigen.analysis.meanings import Meaning, meaning_of
 from phigen.analysis.summary import Drift, Summary
 from phigen.analysis.verification import Check, Verification
 from phigen.compiler import Compilation
@@ -79,15 +80,18 @@ def measured_section(v: Verification) -> Markup:
     rows = [_check(check, v.compared) for check in v.checks]
     targets = " and ".join({"c": "C", "numpy": "NumPy"}.get(t, t) for t in v.targets)
     said = f"Run {v.run}: {v.steps} steps of {v.step:.9g}, generated for {targets}. Solver: {v.label}."
-    meaning = (
-        "Errors are relative to the size of a quantity. Last/first window is the largest error of the last tenth of "
-        "the run over that of the first: 1 is no drift. The Poisson defect is the largest entry of DΦ π DΦᵀ − π∘Φ; "
-        "DΦ is the derivative of a step Φ. An order of ∞ means that all errors are those of rounding."
-    )
+    meanings = dict.fromkeys(meaning_of(check.name) for check in v.checks)
+    rows_explained = page.facts((m.row, page.typeset(_meaning(m))) for m in meanings)
     return page.joined(
         [page.paragraph(said), page.table("What the solver shows, and classical methods beside it", columns, rows),
-         page.paragraph(meaning, "note")]
+         page.paragraph("Errors are relative to the size of a quantity.", "note"),
+         page.fold("What the rows mean", rows_explained)]
     )  # fmt: skip
+
+
+def _meaning(m: Meaning) -> str:
+    said = f"{m.measures[0].upper()}{m.measures[1:]}."
+    return f"{said} A failure means: {m.failure}." if m.failure else said
 
 
 def summary_table(summaries: Sequence[Summary]) -> Markup:

@@ -6,10 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from support import BODY
+from support import BODY, compiled
 
-from phigen import spec
+from phigen import resources, spec
 from phigen.analysis import backward, measures, verification
+from phigen.analysis.meanings import meaning_of
 from phigen.analysis.methods import by_differences, of_classical, of_solver
 from phigen.api import solver_of
 from phigen.cli import group
@@ -202,3 +203,18 @@ def test_command_for_machines_and_exit_code(file, monkeypatch):
     assert {c["name"] for c in data["checks"] if not c["passed"]}
     assert "verification failed" in result.stderr
     assert "reversibility" in result.stderr
+
+
+@pytest.mark.parametrize("name", ["rigid_body", "predator_prey"])
+def test_every_row_has_a_meaning_which_the_documentation_gives(name):
+    compilation = compile_spec(compiled(name).spec, extras=Extras(tangent=True))
+    run = next(iter(compilation.spec.runs.values()))
+    values = {p.name: float(run.parameters.get(p.name, p.value)) for p in compilation.spec.parameters}
+    solvers = {"numpy": solver_of(compilation, "numpy")}
+    start = [float(v) for v in run.initial]
+    found = verification.verify(compilation, solvers, run.name, start, values, float(run.step), 8, quick=True)
+    page = (resources.bundled_specs().parent / "docs" / "commands.md").read_text(encoding="utf-8")
+    for check in found.checks:
+        meaning = meaning_of(check.name)
+        assert f"| {meaning.row} | {meaning.measures} | {meaning.failure or '–'} |" in page
+        assert meaning.failure or not check.limit, check.name

@@ -1,0 +1,79 @@
+"""What each row of a verification measures, and what it means if the row fails: for people who read a table."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Meaning:
+    """``row`` begins the names of the checks that are meant; ``failure`` is empty for rows that are not judged."""
+
+    row: str
+    measures: str
+    failure: str = ""
+
+
+MEANINGS = (
+    Meaning(
+        "observed order",
+        "how the error at one time shrinks with the step: like h^order. The solution is that of DOP853 at small steps. "
+        "∞ means that all errors are those of rounding",
+        "S_1 … S_k or the composition are not those of the stated order",
+    ),
+    Meaning(
+        "Casimir: largest error",
+        "how far a Casimir went from its value at the start, relative to its size, over all steps",
+        "the step leaves the symplectic leaf, or rounding adds up to a drift; the bound is a random walk of rounding "
+        "errors, 10⁻¹⁵ (20 + √steps)",
+    ),
+    Meaning("Casimir: last/first window", "the largest error in the last tenth of the run over that in the first"),
+    Meaning("energy: largest error", "how far H went from its value at the start; it depends on the step"),
+    Meaning(
+        "energy: last/first window",
+        "the same quotient for the energy: about 1 if it oscillates, 10 if it drifts. It is judged if the error is "
+        "more than rounding, and the orbit stays where it was in the first half",
+        "the solver does not follow the flow of any Hamiltonian near H, or the step is so large that H̃ says nothing",
+    ),
+    Meaning(
+        "Poisson defect",
+        "the largest entry of DΦ π DΦᵀ − π∘Φ, relative to its terms; DΦ is the derivative of a step Φ that the code "
+        "states itself. Steps are taken at four states, of sizes h, h/2 and −h",
+        "the step is not a Poisson map. Of an approximate bi-realisation the defect must shrink with the stated power "
+        "of h",
+    ),
+    Meaning(
+        "tangent map",
+        "the stated derivative of a step against differences of order six of the step itself, good to 10⁻¹²",
+        "the derivative is that of another map, so the rows and exponents that rest on it mean nothing",
+    ),
+    Meaning(
+        "reversibility",
+        "how far a step of h and one of −h lead from the start. Judged for symmetric methods",
+        "the method is not symmetric, or the equation of a step was not solved to the last bit",
+    ),
+    Meaning(
+        "agreement",
+        "single steps of C and NumPy from the same states",
+        "one of the targets computes something else: an error of its emitter or of the compiler's flags",
+    ),
+    Meaning(
+        "largest step",
+        "how many times larger than the run's a step may be before the equation of a step has no solution, at most 256",
+        "the step of the run itself fails: make it smaller",
+    ),
+    Meaning(
+        "modified H",
+        "the power of h that changes of the modified Hamiltonian with one and two corrections shrink like. Steps are "
+        "doubled from the run's until the changes stand out from rounding; ∞ means that they never do. For series up "
+        "to order 6 without composition",
+        "the step is the flow of another Hamiltonian than the one stated: S_{k+1}, … or a sign is wrong",
+    ),
+)
+
+
+def meaning_of(check: str) -> Meaning:
+    """The meaning of the check of that name."""
+    kind, colon, rest = check.partition(": ")
+    name = f"Casimir: {rest}" if colon and kind.startswith("Casimir ") else check
+    return next(m for m in MEANINGS if name.startswith(m.row))
