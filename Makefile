@@ -14,7 +14,7 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.phigen-installed
 WORKERS ?= auto
 
-.PHONY: help demo test lint format golden bench clean
+.PHONY: help demo test lint format golden figures bench clean
 
 help:
 	@sed -n '/^#/!q; s/^# \{0,1\}//p' Makefile
@@ -37,6 +37,11 @@ format: $(STAMP)
 # The files in generated/ are examples and golden files at once: read the diff before you commit it.
 golden: $(STAMP)
 	$(BIN)/phigen build specs --output generated
+
+# The figures and numbers of docs/gallery.md and docs/paper.md. About two minutes.
+figures: $(STAMP)
+	$(BIN)/python docs/make_gallery.py
+	$(BIN)/python docs/make_paper.py
 
 # Beside the methods that people would otherwise use; see docs/benchmarks.md. About ten minutes on a quiet machine.
 bench: $(STAMP)

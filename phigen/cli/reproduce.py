@@ -68,6 +68,11 @@ def lines_of(figures: list[dict[str, Any]]) -> list[str]:
     lines: list[str] = []
     for figure in figures:
         rows = [("", "the paper", "measured")]
-        rows += [(f["quantity"], f["paper"], f"{f['measured']:.4g}") for f in figure["findings"]]
+        rows += [(f["quantity"], f["paper"], _shown(f["measured"])) for f in figure["findings"]]
         lines += [heading(figure["title"]), *(f"  {line}" for line in table(rows)), ""]
     return lines[:-1]
+
+
+def _shown(value: float) -> str:
+    """Four digits; one of what is about round-off."""
+    return f"{value:.0e}" if 0 < abs(value) < 1e-11 else f"{value:.4g}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import wraps
@@ -126,4 +127,9 @@ def _rendered(figure: Figure, kind: str, transparent: bool = False) -> bytes:
                "pdf": {"CreationDate": None, "Creator": None, "Producer": None}}  # fmt: skip
     buffer = io.BytesIO()
     figure.savefig(buffer, format=kind, metadata=nothing[kind], transparent=transparent)
-    return buffer.getvalue()
+    return _shortened(buffer.getvalue()) if kind == "svg" else buffer.getvalue()
+
+
+def _shortened(text: bytes) -> bytes:
+    """Places in an SVG file to a thousandth of a point: a third of the bytes of long curves."""
+    return re.sub(rb"(?<=[ML ])(-?\d+\.\d{3})\d+", rb"\1", text)

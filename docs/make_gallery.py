@@ -1,0 +1,172 @@
+"""Makes docs/gallery.md and its figures from the specs of the corpus: python docs/make_gallery.py [NAME …]"""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from phigen import resources, spec
+from phigen.analysis import figures
+from phigen.analysis.paper.runge_kutta import started
+from phigen.analysis.race import TABLEAUX
+from phigen.analysis.sections import function_of
+from phigen.analysis.summary import Summary, summarise
+from phigen.api import compilation_of, solver_of
+from phigen.cli.list import kind_of_structure
+from phigen.cli.show import readable_one
+from phigen.runtime.interface import BackendError
+from phigen.runtime.session import rows_along
+from phigen.runtime.solver import Solver
+from phigen.spec.model import Run, Spec
+from phigen.symbolic.expression import natural_key
+
+DOCS = Path(__file__).resolve().parent
+PAGE, FACTS, FIGURES = DOCS / "gallery.md", DOCS / "figures" / "gallery.json", DOCS / "figures" / "gallery"
+#: Steps of a run that are drawn, and crossings of a section.
+DRAWN, CROSSINGS = 1500, 1500
+#: The longest formula that is shown.
+LONGEST = 160
+HEAD = """# Gallery
+
+The bundled specs, one run of each: the longest. The figures show how it begins, a dot where it starts, and the leaf
+if there is a Casimir of three coordinates. The tables have the largest errors over the whole run, relative to the
+initial value unless that is zero, of phigen's solver and of the classical method that the spec names, with the same
+step. `cp "$(phigen list --path kepler)" .` takes a spec as a start for your own; `phigen show` prints its formulas.
+How errors grow or do not grow is on the page that `phigen report` makes of any spec.
+
+This page is made by `python docs/make_gallery.py`.
+"""
+
+
+def names() -> list[str]:
+    """The corpus, in the order of `phigen list`."""
+    return sorted((p.stem for p in resources.bundled_specs().glob("*.yaml")), key=natural_key)
+
+
+def source(name: str) -> Spec:
+    """A spec of the corpus."""
+    return spec.load(resources.bundled_specs() / f"{name}.yaml")
+
+
+def longest_run(found: Spec) -> Run:
+    """The run with the most steps; the first of several."""
+    return max(found.runs.values(), key=lambda run: run.steps)
+
+
+def facts(name: str) -> dict[str, Any]:
+    """What is measured of a spec."""
+    found = source(name)
+    compilation = compilation_of(found)
+    solver, run = solver_of(compilation), longest_run(found)
+    parameters = {p.name: float(run.parameters.get(p.name, p.value)) for p in found.parameters}
+    x0, h = np.array([float(v) for v in run.initial]), float(run.step)
+    own = solver.integrate(x0, h, run.steps, run.stride, parameters=parameters)
+    summaries = [summarise("phigen", compilation.system, run, parameters, own.t, own.x)]
+    for method in [m for m in run.compare if m in TABLEAUX]:
+        try:
+            x = rows_along(started(method, compilation, x0, parameters), h, run.steps, run.stride, None)
+        except BackendError as error:
+            x = error.states
+        summaries.append(summarise(method.upper(), compilation.system, run, parameters, own.t[: len(x)], x))
+    return {
+        "sha256": found.source_sha256,
+        "structure": kind_of_structure(found),
+        "method": compilation.label,
+        "order": solver.order,
+        "hamiltonian": readable_one(compilation.system.hamiltonian, None),
+        "casimirs": {c: readable_one(e, None) for c, e in compilation.system.casimirs.items()},
+        "run": run.name,
+        "errors": {summary.method: _errors(summary) for summary in summaries},
+    }
+
+
+def _errors(summary: Summary) -> dict[str, float]:
+    drifts = {"H": summary.energy, **summary.casimirs, **summary.invariants}
+    if summary.exact:
+        drifts["solution"] = summary.exact
+    return {quantity: drift.error for quantity, drift in drifts.items()}
+
+
+def draw(name: str) -> None:
+    """The figures of a spec."""
+    found = source(name)
+    compilation = compilation_of(found)
+    solver, run = solver_of(compilation), longest_run(found)
+    parameters = {p.name: float(run.parameters.get(p.name, p.value)) for p in found.parameters}
+    # Many panels would make a large file: fewer steps there, and of very many no leaves.
+    steps = min(run.steps, DRAWN if found.dimension <= 4 else DRAWN // 2)
+    casimirs = compilation.system.casimirs if found.dimension <= 9 else {}
+    trajectory = solver.integrate(run.initial, float(run.step), steps, parameters=parameters)
+    figures.save(figures.trajectory_figure(trajectory, casimirs), FIGURES / f"{name}.svg")
+    if sections := _sections(found, solver):
+        figures.save(figures.section_figure(sections, solver.coordinates), FIGURES / f"{name}_section.svg")
+
+
+def _sections(found: Spec, solver: Solver) -> dict[str, Any]:
+    """The crossings of each run that has a section; in three dimensions these are a point, which is no picture."""
+    sections = {}
+    for run in found.runs.values():
+        if run.section is not None and found.dimension > 3:
+            parameters = {p.name: float(run.parameters.get(p.name, p.value)) for p in found.parameters}
+            g = function_of(run.section, solver.coordinates, parameters)
+            points = solver.section(run.initial, float(run.step), run.steps, g, parameters=parameters).x
+            sections[f"{run.name}: {readable_one(run.section, None)} = 0"] = points[:CROSSINGS]
+    return sections
+
+
+def page(known: dict[str, dict[str, Any]]) -> str:
+    """The page, from the specs and the facts."""
+    rows = [f"| [{name}](#{name}) | {len(source(name).coordinates)} | {source(name).title} |" for name in names()]
+    contents = "\n".join(["| spec | dimension | system |", "|---|---|---|", *rows])
+    return "\n".join([HEAD, contents, *(_entry(source(name), known[name]) for name in names())])
+
+
+def _entry(found: Spec, fact: dict[str, Any]) -> str:
+    run = longest_run(found)
+    images = [f"![{found.title}: a trajectory](figures/gallery/{found.name}.svg)"]
+    if (FIGURES / f"{found.name}_section.svg").exists():
+        images.append(f"![{found.title}: a Poincaré section](figures/gallery/{found.name}_section.svg)")
+    lines = [f"H = {fact['hamiltonian']}", *(f"{name} = {e}" for name, e in fact["casimirs"].items())]
+    shown = [line if len(line) <= LONGEST else line.split(" = ")[0] + " = …" for line in lines]
+    about = f"π: {fact['structure']}. Method: {fact['method']}, order {fact['order']}."
+    length = f"Run `{run.name}`: {run.steps} steps of {float(run.step):g}."
+    return "\n\n".join(
+        ["", f"## {found.name}", f"**{found.title}.** {found.description}", "\n".join(images),
+         "```text\n" + "\n".join(shown) + "\n```", f"{about} {length}", _table(fact["errors"])]
+    )  # fmt: skip
+
+
+def _table(errors: dict[str, dict[str, float]]) -> str:
+    head = ["largest error", *errors]
+    quantities = next(iter(errors.values()))
+    body = [[q, *(_shown(found[q]) for found in errors.values())] for q in quantities]
+    return "\n".join(f"| {' | '.join(row)} |" for row in [head, ["---"] * len(head), *body])
+
+
+def _shown(error: float) -> str:
+    """Two digits; of rounding errors, which differ from compiler to compiler, that they are such."""
+    return "round-off" if error < 1e-12 else f"{error:.1e}" if np.isfinite(error) else "breaks down"
+
+
+def main(chosen: list[str]) -> None:
+    """Facts and figures of these specs, of all by default; then the page."""
+    FIGURES.mkdir(parents=True, exist_ok=True)
+    for stray in FIGURES.glob("*.svg"):
+        if not chosen:
+            stray.unlink()
+    known = json.loads(FACTS.read_text(encoding="utf-8")) if FACTS.exists() else {}
+    for name in chosen or names():
+        print(name, file=sys.stderr)
+        known[name] = facts(name)
+        draw(name)
+    known = {name: known[name] for name in names()}
+    FACTS.write_text(json.dumps(known, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    PAGE.write_text(page(known), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
