@@ -101,6 +101,8 @@ def remarks(found: Tuning) -> Iterator[str]:
     over, whole = best.point.time, found.horizon
     if is_measured(best, found):
         yield "Errors were measured up to there" + _extrapolated(found)
+    elif found.measure == "energy" and not best.curve.bounded:
+        yield f"Errors were measured up to t = {over:.4g}, and extrapolated (~) as they were seen to grow."
     elif found.measure == "energy":
         yield f"Errors were measured up to t = {over:.4g}. Beyond, phigen's stay bounded but for rounding (~)."
     else:

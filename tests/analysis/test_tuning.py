@@ -4,6 +4,7 @@ import math
 import re
 import time
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,7 +17,7 @@ from phigen.analysis.tuning.problem import Problem
 from phigen.analysis.tuning.references import agreed, orbit_error
 from phigen.analysis.tuning.search import Curve, cheapest_step, proposals, scan, step_for
 from phigen.analysis.tuning.settings import OWN, SPLITTING, Setting, charts, own_setting, variants
-from phigen.analysis.tuning.study import Finalist, ranking
+from phigen.analysis.tuning.study import Finalist, confirmed, ranking
 from phigen.analysis.tuning.timing import nanoseconds_per_step
 from phigen.analysis.tuning.trials import MARKS, Point, energy_measure, marks, orbit_measure
 from phigen.analysis.tuning.tuner import expected_seconds
@@ -187,6 +188,37 @@ def test_of_equally_cheap_methods_the_lowest_order_comes_first():
     found = ranking([finalist(10, 1.0), finalist(6, 1.04), finalist(4, 1.03, 5), finalist(2, 1.2), finalist(8, 1.01)])
     assert [f.curve.order for f in found] == [6, 10, 8, 4, 2]
     assert ranking([]) == []
+
+
+def tuner_of(grows, budget=1e6):
+    """A search that has ended, for one method: of order 4, its error over the horizon a multiple of that of a scan."""
+    curve = Curve("a", 4, points(4, [0.5**k for k in range(8)]), Setting("a", 4))
+
+    def measure(method, h, span):
+        return replace(points(4, [h], constant=grows if span > 100 else 1.0)[0], time=span)
+
+    return curve, SimpleNamespace(
+        accuracy=1e-6, methods={curve.key: None}, measures={True: measure}, piece=100.0, referring=False,
+        problem=SimpleNamespace(horizon=1e4), clock=SimpleNamespace(budget=budget),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("grows", [1.0, 2.0, 5.0])
+def test_step_that_misses_the_accuracy_over_the_horizon_is_reduced(grows):
+    curve, tuner = tuner_of(grows)
+    point = confirmed(tuner, curve)
+    assert point.time == 1e4
+    assert 0.3e-6 < point.error <= 1e-6
+
+
+def test_what_never_reaches_the_accuracy_over_the_horizon_is_not_proposed():
+    curve, tuner = tuner_of(1e6)
+    assert confirmed(tuner, curve) is None
+
+
+def test_run_that_the_budget_does_not_allow_is_confirmed_over_a_part():
+    curve, tuner = tuner_of(1.0, budget=2e-2)
+    assert 100.0 <= confirmed(tuner, curve).time < 1e4
 
 
 # -- what errors mean for longer runs

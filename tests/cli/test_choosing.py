@@ -47,7 +47,7 @@ def built(name, setting):
 @pytest.mark.parametrize("row", rows("Energy up to t = 100,000"), ids=lambda row: "-".join(row[:2]))
 def test_proposed_settings_reach_their_accuracy_and_hardly_more(row):
     name, accuracy, kind, order, step, *_ = row
-    assert 0.03 < energy_error(name, kind, order, step) / float(accuracy) <= 1
+    assert 0.2 < energy_error(name, kind, order, step) / float(accuracy) <= 1
 
 
 @pytest.mark.parametrize("row", rows("What each choice does"), ids=lambda row: "-".join(row[:3]))

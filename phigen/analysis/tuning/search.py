@@ -31,7 +31,10 @@ GAIN = 1.5
 
 @dataclass(frozen=True)
 class Curve:
-    """What was measured of one method: points from coarse to fine. ``setting`` is None for a classical method."""
+    """What was measured of one method: points from coarse to fine. ``setting`` is None for a classical method.
+
+    ``bounded`` says whether its energy error is: of Poisson maps, not of truncated ones and classical methods.
+    """
 
     label: str
     order: int
@@ -39,6 +42,7 @@ class Curve:
     setting: Setting | None = None
     gauged: bool = False
     symmetric: bool = True
+    bounded: bool = True
     stages: int = 1
     seconds: float = 0.0
 

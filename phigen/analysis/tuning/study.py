@@ -109,7 +109,7 @@ def ranking(finalists: Sequence[Finalist]) -> list[Finalist]:
     """By cost; of those that are as cheap as the best, as far as can be told, the one of lowest order comes first."""
     ranked = sorted(finalists, key=lambda f: f.cost)
     equal = [f for f in ranked if f.cost <= EQUAL * ranked[0].cost]
-    simple = min(equal, key=lambda f: (f.curve.order * f.curve.stages, f.cost), default=None)
+    simple = min(equal, key=lambda f: (f.curve.order * max(f.curve.stages, 1), f.cost), default=None)
     return [simple, *(f for f in ranked if f is not simple)] if simple else []
 
 
@@ -118,8 +118,9 @@ def final(tuner: Tuner, own: Curve) -> list[Finalist]:
     accuracy = tuner.accuracy
     found: list[Finalist] = []
     for curve in sorted(tuner.tried.values(), key=lambda c: c.cost(accuracy)):
+        enough = len(found) >= FINALISTS or tuner.clock.left(1.0) < 0
         behind = bool(found) and curve.cost(accuracy) > BEHIND * found[0].point.cost
-        if math.isinf(curve.cost(accuracy)) or ((len(found) >= FINALISTS or behind) and curve is not own):
+        if math.isinf(curve.cost(accuracy)) or (found and (enough or behind) and curve is not own):
             continue
         point = confirmed(tuner, curve)
         if point:
@@ -133,7 +134,7 @@ def confirmed(tuner: Tuner, curve: Curve) -> Point | None:
     One that misses the accuracy is reduced, some times. None if that does not help.
     """
     accuracy = tuner.accuracy
-    method, measure = tuner.methods[curve.key], tuner.measures[curve.setting is not None]
+    method, measure = tuner.methods[curve.key], tuner.measures[curve.bounded]
     step, _ = search.cheapest_step(curve.points, search.AIM * accuracy, curve.order)
     step = step or search.cheapest_step(curve.points, accuracy, curve.order)[0]
     for _ in range(ATTEMPTS):
@@ -167,7 +168,7 @@ def _present(tuner: Tuner, own: Curve) -> Finalist | None:
     """The spec as it is, with the step of the run."""
     h = tuner.problem.step
     span = confirming_span(tuner, own, h)
-    point = tuner.measures[True](tuner.methods[own.key], h, span) if span else None
+    point = tuner.measures[own.bounded](tuner.methods[own.key], h, span) if span else None
     return Finalist(own, point) if point else None
 
 

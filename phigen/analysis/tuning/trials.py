@@ -60,8 +60,8 @@ def marks(span: float, h: float) -> tuple[int, int]:
 def energy_measure(problem: Problem, *, bounded: bool = True) -> Measure:
     """The largest error of the energy on the way, relative to its initial value unless that is negligible.
 
-    For phigen's methods it is ``bounded``: the same over the horizon, but for rounding. That of others grows with
-    time wherever it was seen to grow.
+    That of Poisson maps is ``bounded``: the same over the horizon, but for rounding. That of others grows with time
+    wherever it was seen to grow.
     """
     scale = float(np.max(np.abs(problem.start), initial=0.0))
 
@@ -91,7 +91,7 @@ def energy_measure(problem: Problem, *, bounded: bool = True) -> Measure:
 def orbit_measure(problem: Problem, reference: Solution, *, bounded: bool = True) -> Measure:
     """The largest distance from a reference at about `MARKS` times, relative to the largest coordinate there is.
 
-    Up to the horizon the error of phigen's methods is taken to grow linearly in time, since that of their energy is
+    Up to the horizon the error of Poisson maps is taken to grow linearly in time, since that of their energy is
     ``bounded``, unless it was seen to grow faster, as rounding does; that of others at least linearly.
     """
 

@@ -14,7 +14,7 @@ from phigen.analysis.tuning.problem import Candidate, Classical, Method, Problem
 from phigen.analysis.tuning.references import Reference, agreed, orbit_error
 from phigen.analysis.tuning.scales import scales
 from phigen.analysis.tuning.search import Curve
-from phigen.analysis.tuning.settings import Setting, charts, direct, own_setting
+from phigen.analysis.tuning.settings import SPLITTING, Setting, charts, direct, own_setting
 from phigen.analysis.tuning.trials import LINEAR, Measure, Point, energy_measure, marks, orbit_measure
 from phigen.api import chosen_target, solver_of
 from phigen.compiler import Compilation
@@ -47,7 +47,7 @@ class Clock:
 
 
 class Tuner:
-    """The state of a search. ``measures`` maps True to the measure of phigen's methods, False to that of others.
+    """The state of a search. ``measures`` maps True to the measure of Poisson maps, False to that of other methods.
 
     ``piece`` is the time over which candidates are scanned, ``most`` the largest step that is of use, ``referring``
     whether orbits are compared with a reference; ``target`` is C where there is a compiler.
@@ -107,8 +107,11 @@ class Tuner:
         """Scan a candidate."""
         setting = made.setting
         self._known[made.fingerprint] = setting
-        points = self._scanned(method, made.order, worth, own=True)
-        curve = Curve(made.kind, made.order, points, setting, made.gauged, made.symmetric, made.stages, made.seconds)
+        points = self._scanned(method, made.order, worth, bounded=made.exact)
+        curve = Curve(
+            made.kind, made.order, points, setting,
+            gauged=made.gauged, symmetric=made.symmetric, bounded=made.exact, stages=made.stages, seconds=made.seconds,
+        )  # fmt: skip
         self.tried[setting], self.methods[setting] = curve, method
         return curve
 
@@ -121,8 +124,8 @@ class Tuner:
         for name, (label, order) in PEERS.items():
             label = f"{label} in {'C' if self.target == 'c' else 'Python'}"
             self.methods[label] = self._classical(name)
-            points = self._scanned(self.methods[label], order, WORTH_KNOWING * self.least, own=False)
-            found.append(Curve(label, order, points))
+            points = self._scanned(self.methods[label], order, WORTH_KNOWING * self.least, bounded=False)
+            found.append(Curve(label, order, points, bounded=False))
         return found
 
     def try_all(self, settings: Sequence[Setting]) -> None:
@@ -171,9 +174,9 @@ class Tuner:
                 kept.append(setting)
         return kept
 
-    def _scanned(self, method: Method, order: int, worth: float, *, own: bool) -> tuple[Point, ...]:
+    def _scanned(self, method: Method, order: int, worth: float, *, bounded: bool) -> tuple[Point, ...]:
         until = time.perf_counter() + min(SCANNING * self.clock.budget, max(self.clock.left(0.9), 0.0))
-        measure, piece = self.measures[own], self.piece
+        measure, piece = self.measures[bounded], self.piece
         return search.scan(
             lambda h: measure(method, h, piece), self.problem.step, self.most, self.accuracy, order, worth,
             lambda: time.perf_counter() < until,
@@ -193,10 +196,12 @@ class Tuner:
         """Measure orbits from now on: against a solver of higher order, where there is one, confirmed by DOP853."""
         problem, until = self.problem, time.perf_counter() + BUILDING * self.clock.budget
         high = replace(setting, order=max(setting.order, 8), composition=direct(setting))
+        others = [s for s in (Setting(SPLITTING, 8, "none", "auto"), high) if s != setting]
         if high != setting:
-            ((_, outcome),) = build_all(self.compilation.spec, self.compilation.system, [high], until)
-            if isinstance(outcome, Built):
-                self._made[high], method = outcome, Candidate(outcome.solver(), problem)
+            outcomes = build_all(self.compilation.spec, self.compilation.system, others, until)
+            self._made |= {s: outcome for s, outcome in outcomes if isinstance(outcome, Built)}
+            known = [self._made[s] for s in others if s in self._made]
+            method = Candidate(known[-1].solver(), problem) if known else method
         reference = self._reference(method)
         self.note(f"reference: two methods agree to {reference.uncertainty:.1e} over t = 0 … {self.piece:.6g}")
         self.referring = True
