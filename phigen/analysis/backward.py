@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from fractions import Fraction
 
 import numpy as np
 
@@ -73,10 +74,16 @@ def modified(compilation: Compilation, parameters: Mapping[str, float], gauge: F
         raise NotOfferedError("the bi-realisation is an approximate one")
     if order.order > MOST_ORDER:
         raise NotOfferedError(f"it is computed for orders up to {MOST_ORDER}")
-    try:
-        found = corrections(system, compilation.chart, order, CORRECTIONS, compilation.gauge)
-    except LimitError:
-        raise NotOfferedError("its formula is too large") from None
+    # With numbers for the parameters there are fewer terms; but the series may have no place for their roots.
+    exact = {name: Fraction(repr(value)) for name, value in parameters.items()}
+    for known in (exact, {}):
+        try:
+            found = corrections(system, compilation.chart, order, CORRECTIONS, compilation.gauge, known)
+            break
+        except (LimitError, ArithmeticError):
+            continue
+    else:
+        raise NotOfferedError("its formula is too large")
     values = dict(parameters)
     if gauge is not None and compilation.gauge is not None:
         values |= dict(zip(compilation.gauge.symbols, np.ravel(gauge).tolist(), strict=True))

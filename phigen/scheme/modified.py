@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from fractions import Fraction
+
 from phigen.errors import Diagnostic, SpecError
 from phigen.geometry.system import System
 from phigen.realisations.protocol import BiRealisation
@@ -11,7 +14,7 @@ from phigen.scheme.generating import STEP
 from phigen.scheme.order import Order
 from phigen.scheme.program import Kernel, Output
 from phigen.series.modified import ModifiedSeries, modified_series
-from phigen.symbolic.expression import Expression
+from phigen.symbolic.expression import Expression, number, substitute
 
 
 def powers(order: Order, count: int, *, symmetric: bool) -> list[int]:
@@ -20,21 +23,31 @@ def powers(order: Order, count: int, *, symmetric: bool) -> list[int]:
 
 
 def corrections(
-    system: System, realisation: BiRealisation, order: Order, count: int, gauge: Gauge | None = None
+    system: System,
+    realisation: BiRealisation,
+    order: Order,
+    count: int,
+    gauge: Gauge | None = None,
+    values: Mapping[str, Fraction] | None = None,
 ) -> ModifiedSeries:
     """H_0, H_1, … of H − Σ λC with ``count`` corrections, in a tower that contains the step size.
 
-    Raises `LimitError` if a correction is too large.
+    ``values`` of parameters are put in, which makes formulas shorter. Raises `LimitError` if a correction is too large.
     """
     gauge = gauge or Gauge()
     gauged = gauge.applied(system)
     power = powers(order, count, symmetric=realisation.symmetric)[-1] if count else 0
+    values = values or {}
     try:
+        hamiltonian, *alpha = substitute(
+            [gauged.hamiltonian, *formal_alpha(gauged, realisation, power + 1)],
+            {name: number(value) for name, value in values.items()},
+        )
         return modified_series(
-            gauged.hamiltonian,
-            formal_alpha(gauged, realisation, power + 1),
+            hamiltonian,
+            alpha,
             system.coordinates,
-            [*system.parameter_names, *gauge.symbols, STEP],
+            [*(p for p in system.parameter_names if p not in values), *gauge.symbols, STEP],
             order.terms,
             power,
             symmetric=realisation.symmetric,

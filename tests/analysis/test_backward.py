@@ -12,6 +12,8 @@ from phigen.analysis.methods import of_classical, of_solver
 from phigen.analysis.verification import gauge_at
 from phigen.api import solver_of
 from phigen.compiler import compile_spec
+from phigen.errors import LimitError
+from phigen.scheme.modified import corrections
 
 
 def subject(name):
@@ -63,3 +65,25 @@ def test_where_it_is_not_offered_it_says_why(options, why):
     compilation = compile_spec(spec.loads(f"{text}hamiltonian: p**2/2 - cos(q)\nbirealisation: constant\n{options}\n"))
     with pytest.raises(backward.NotOfferedError, match=why):
         backward.modified(compilation, {}, None)
+
+
+GYROSTAT = """phigen: 1
+name: t
+coordinates: [m1, m2, m3]
+parameters: {J1: 1, J2: 2, J3: 3.5, k: 0.7}
+poisson: {brackets: {m1: {m2: -m3, m3: m2}, m2: {m3: -m1}}}
+hamiltonian: m1**2/(2*J1) + m2**2/(2*J2) + (m3 - k)**2/(2*J3)
+casimirs: {C: m1**2 + m2**2 + m3**2}
+order: 6
+"""
+
+
+def test_numbers_for_the_parameters_make_a_formula_that_would_be_too_large():
+    compilation = compile_spec(spec.loads(GYROSTAT))
+    with pytest.raises(LimitError):
+        corrections(compilation.system, compilation.chart, compilation.order, 2, compilation.gauge)
+    values, x = {"J1": 1.0, "J2": 2.0, "J3": 3.5, "k": 0.7}, np.array([0.2, 1, 0.1])
+    gauge = gauge_at(compilation, x, values)
+    method = of_solver(solver_of(compilation, "c"), values, gauge)
+    found = backward.modified(compilation, values, gauge)
+    assert backward.observed_powers(found, method, x, 0.1) == pytest.approx([6, 8, 10], abs=0.7)
