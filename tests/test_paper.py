@@ -2,7 +2,6 @@
 
 import json
 import math
-import re
 import shutil
 from functools import cache
 from pathlib import Path
@@ -10,7 +9,7 @@ from pathlib import Path
 import click
 import pytest
 from click.testing import CliRunner
-from walkthrough import follow
+from walkthrough import follow, labels_of
 
 pytest.importorskip("matplotlib")
 pytestmark = pytest.mark.skipif(not shutil.which("cc"), reason="needs a C compiler")
@@ -30,12 +29,6 @@ STORED = {entry["figure"]: entry for entry in json.loads((DOCS / "figures" / "pa
 def made(name: str) -> Plate:
     """A figure of today; of the long run its first hundredth."""
     return rigid_body.errors_plate(rigid_body.EARLY) if name == "rigid_body" else PLATES[name]()
-
-
-def words(text):
-    """The labels of an SVG file but the numbers along its axes."""
-    found = re.findall(r"<text[^>]*>([^<]*)</text>", text)
-    return [label for label in found if not re.fullmatch(r"[−\d.]*", label)]
 
 
 @pytest.mark.parametrize("name", PLATES)
@@ -64,7 +57,7 @@ def test_long_run_goes_on_as_it_began():
 def test_figures_are_current_and_small(name):
     path = DOCS / "figures" / f"{name}.svg"
     assert path.stat().st_size < 150_000
-    assert words(path.read_text()) == words(svg(made(name).figure))
+    assert labels_of(path.read_text()) == labels_of(svg(made(name).figure))
 
 
 def test_tables_are_those_of_the_measurement():

@@ -1,11 +1,13 @@
 """Pages of documentation followed to the letter: files written, commands typed, answers compared.
 
 A fenced block is a file if the last sentence before it starts with its name in backquotes. A ``console`` block holds
-commands after ``$`` and what they answer; ``…`` stands for anything, a line of its own for any lines.
+commands after ``$`` and what they answer; ``…`` stands for anything, a line of its own for any lines. Numbers with
+a point need not agree to the last digit.
 """
 
 from __future__ import annotations
 
+import math
 import os
 import re
 import subprocess
@@ -13,6 +15,7 @@ import sys
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
+_NUMBER = r"(?<![\w./-])-?\d+\.\d+(?:e[+-]\d+)?(?![\w./])"
 _FILES = ("yaml", "python", "c", "sh")
 
 
@@ -44,6 +47,12 @@ def follow(page: Path, folder: Path) -> int:
     return count
 
 
+def labels_of(svg: str) -> list[str]:
+    """The labels in an SVG file but the numbers along its axes."""
+    found = re.findall(r"<text[^>]*>([^<]*)</text>", svg)
+    return [label for label in found if not re.fullmatch(r"[−\d.]*", label)]
+
+
 def _environment(folder: Path) -> dict[str, str]:
     tools = folder / ".tools"
     tools.mkdir()
@@ -64,13 +73,26 @@ def _type(text: str, folder: Path, environment: dict[str, str]) -> int:
             stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
         )  # fmt: skip
         status = done.returncode
-        assert re.fullmatch(_pattern(answer), done.stdout), (
-            f"$ {command}\n{done.stdout}\n--- the page says ---\n{answer}"
-        )
+        assert _agrees(answer, done.stdout), f"$ {command}\n{done.stdout}\n--- the page says ---\n{answer}"
     return len(parts)
 
 
-def _pattern(answer: str) -> str:
-    return "".join(
-        r"(?:.*\n)*?" if line == "…" else re.escape(line).replace("…", ".*") + r"\n" for line in answer.splitlines()
+def _agrees(answer: str, output: str) -> bool:
+    """Whether an answer of the page is that of today: numbers to two per cent, round-off as such."""
+    pattern = "".join(r"(?:.*\n)*?" if line == "…" else _pattern(line) + r"\n" for line in answer.splitlines())
+    match = re.fullmatch(pattern, output)
+    return bool(match) and all(
+        math.isclose(float(said), float(found), rel_tol=0.02) or max(abs(float(said)), abs(float(found))) < 1e-12
+        for said, found in zip(_said(answer), match.groups(), strict=True)
     )
+
+
+def _said(answer: str) -> list[str]:
+    return [number for line in answer.splitlines() for number in re.findall(_NUMBER, line)]
+
+
+def _pattern(line: str) -> str:
+    """Numbers as groups, blanks in any quantity: columns move with the width of numbers."""
+    pieces = re.split(_NUMBER, line)
+    texts = [re.sub(r"(?:\\ )+", " +", re.escape(text).replace("…", ".*")) for text in pieces]
+    return rf"({_NUMBER})".join(texts)
