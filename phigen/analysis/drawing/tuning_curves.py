@@ -57,5 +57,6 @@ def _basis(found: Tuning) -> str:
     if found.piece > 0.99 * found.horizon:
         return "measured over all of it"
     best = found.winner
-    over = "" if best is None else f"; stars: measured to t = {best.point.time:.4g}"
+    farther = best is not None and best.point.time > 1.01 * found.piece
+    over = f"; stars: measured to t = {best.point.time:.4g}" if best and farther else ""
     return f"measured to t = {found.piece:.4g} and extrapolated{over}"

@@ -11,6 +11,7 @@ from phigen.scheme import alternation
 from phigen.scheme.composition import COMPOSITIONS
 from phigen.spec import limits
 from phigen.spec.model import BirealisationChoice, Spec
+from phigen.spec.names import BIREALISATIONS
 
 #: What the spec itself says, where that cannot be said by a name: formulas, or options of a kind.
 OWN = "as in the spec"
@@ -21,7 +22,9 @@ ORDERS = tuple(range(2, limits.ORDER + 1, 2))
 #: The scheme that needs no bi-realisation, which stands in the place of its kind.
 SPLITTING = "splitting"
 
-_KINDS = ("constant", "log-canonical", "gauged", "exponential", "cayley", "karasev")
+#: Kinds that need formulas of the user, and those with choices of their own.
+_FORMULAS = ("custom", "group-map", "spray")
+_CHOICES = ("auto", "canonical-euler", "product", "pullback")
 _NESTED = (("product", "auto"), ("product", "cayley"), ("pullback", "auto"), ("pullback", "cayley"))
 
 
@@ -96,7 +99,7 @@ def own_setting(compilation: Compilation) -> Setting:
     if realisation is None:
         return Setting(SPLITTING, order, gauge, spec.composition)
     choice = spec.birealisation
-    plain = choice == BirealisationChoice(choice.kind) and choice.kind not in ("custom", "group-map", "spray")
+    plain = choice == BirealisationChoice(choice.kind) and choice.kind not in _FORMULAS
     composed = len(compilation.program.fractions) > 1
     return Setting(realisation.kind if plain else OWN, order, gauge, spec.composition if composed else "none")
 
@@ -108,7 +111,8 @@ def charts(system: System, own: Setting) -> list[Setting]:
     maps are those of a closed form. Which of the others apply, building them shows.
     """
     linear = isinstance(system.shape, Constant | Canonical | LiePoisson | Affine)
-    named = [Setting(kind, 4) for kind in _KINDS if not (kind == "karasev" and linear)]
+    plain = [kind for kind in BIREALISATIONS if kind not in (*_FORMULAS, *_CHOICES)]
+    named = [Setting(kind, 4) for kind in plain if not (kind == "karasev" and linear)]
     nested = [Setting(kind, 4, of=of) for kind, of in _NESTED]
     # The other side is the adjoint, whose errors are the same in reversed time.
     euler = [Setting("canonical-euler", order) for order in (1, 4)]
