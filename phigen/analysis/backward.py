@@ -27,8 +27,6 @@ CORRECTIONS, MOST_ORDER = 2, 6
 STEPS, DOUBLINGS, HALVINGS = 16, 8, 6
 #: Changes of H̃ below this are of rounding, and of H above that of steps too large to tell an order.
 ROUNDING, ASYMPTOTIC = 1e-13, 1e-3
-#: Steps of the trajectory that is shown.
-SHOWN = 400
 
 
 class NotOfferedError(ValueError):
@@ -123,8 +121,8 @@ def observed_powers(found: Modified, method: Method, x: Floats, h: float) -> lis
 class Constancy:
     """How constant H̃ is with 0, 1, … corrections: ``powers[m]`` is the power of the step that it should show.
 
-    ``errors`` (corrections + 1, rows) are those at ``times`` (rows,) of a trajectory of step ``step``; ``changes``
-    (sizes, corrections + 1) the largest ones up to the time ``end`` at the step sizes ``sizes``, the largest first.
+    ``errors`` (corrections + 1, rows) are those at ``times`` (rows,), up to ``end``, of steps of size ``step``;
+    ``changes`` (sizes, corrections + 1) are the largest ones at the step sizes ``sizes``, the largest first.
     """
 
     powers: tuple[int, ...]
@@ -158,7 +156,7 @@ def constancy(found: Modified, method: Method, x: Floats, h: float) -> Constancy
     # The finest step at which even the last correction leaves more than rounding.
     telling = np.flatnonzero(changes[:, -1] > ROUNDING)
     shown = float(sizes[telling[-1] if len(telling) else 0])
-    rows = method.rows(x, shown, SHOWN, 1)
+    rows = method.rows(x, shown, round(STEPS * largest / shown), 1)
     times: Floats = shown * np.arange(len(rows), dtype=np.float64)
     observed = tuple(observed_powers(found, method, x, h))
     return Constancy(found.powers, observed, shown, times, found.errors(rows, shown), STEPS * largest, sizes, changes)

@@ -42,7 +42,7 @@ class Race:
     """
 
     runners: Mapping[str, Runner]
-    set_up: Callable[[int], None]
+    set_up: Callable[[int], object]
     language: str
 
 
@@ -59,22 +59,27 @@ def compiled(compilation: Compilation, methods: Sequence[str], start: Floats, pa
     packed = np.array(list(parameters.values()) or [0.0])
 
     pointer, size = ctypes.c_void_p, ctypes.c_size_t
+    length, begin = getattr(library, f"{name}_race_size"), getattr(library, f"{name}_race_start")
+    length.restype, length.argtypes = size, ()
+    begin.restype, begin.argtypes = ctypes.c_int, (pointer, pointer, size, pointer)
+    begun = np.zeros(-(-length() // 8))
 
-    def runner(method: str) -> Runner:
+    def set_up(repeats: int) -> int:
+        return int(begin(packed.ctypes.data, start.ctypes.data, repeats, begun.ctypes.data))
+
+    def runner(method: str, given: Floats) -> Runner:
         function = getattr(library, f"{name}_race_{method}")
         function.restype, function.argtypes = ctypes.c_int, (pointer, pointer, ctypes.c_double, size, size, pointer)
 
         def run(h: float, steps: int, repeats: int) -> Floats | None:
             x = np.empty_like(start)
-            failed = function(packed.ctypes.data, start.ctypes.data, h, steps, repeats, x.ctypes.data)
+            failed = function(given.ctypes.data, start.ctypes.data, h, steps, repeats, x.ctypes.data)
             return None if failed else x
 
         return run
 
-    begin = getattr(library, f"{name}_race_start")
-    begin.restype, begin.argtypes = ctypes.c_int, (pointer, pointer, size)
-    runners = {method: runner(method) for method in (OWN, *explicit)}
-    return Race(runners, lambda repeats: begin(packed.ctypes.data, start.ctypes.data, repeats), "C")
+    own = runner(OWN, begun) if set_up(1) == 0 else lambda h, steps, repeats: None
+    return Race({OWN: own, **{m: runner(m, packed) for m in explicit}}, set_up, "C")
 
 
 def interpreted(solver: Solver, methods: Sequence[str], start: Floats, parameters: Mapping[str, float]) -> Race:

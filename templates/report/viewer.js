@@ -142,7 +142,9 @@ if (document.getElementById("viewer")) {
     }
     canvas.dataset.view = [view.yaw, view.pitch, view.zoom].map((v) => v.toFixed(3)).join(" ");
     const shown = data.names.map((n, a) => `${n} = ${rounded(value(0, a, row), decimals(a))}`);
-    element("viewer-state").textContent = shown.slice(0, 13).join(", ") + (shown.length > 13 ? ", …" : "");
+    const told = shown.slice(0, 13).join(", ") + (shown.length > 13 ? ", …" : "");
+    // A screen reader speaks it whenever it is set.
+    if (element("viewer-state").textContent !== told) element("viewer-state").textContent = told;
   }
 
   function turn(yaw, pitch) {

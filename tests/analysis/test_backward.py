@@ -34,7 +34,7 @@ def test_each_correction_makes_the_modified_hamiltonian_two_orders_more_constant
     assert measured.powers == (found.powers[0], found.powers[0] + 2, found.powers[0] + 4)
     assert measured.observed == pytest.approx(measured.powers, abs=0.3)
     assert (measured.errors.max(axis=1)[1:] < 0.3 * measured.errors.max(axis=1)[:-1]).all()
-    assert measured.times[-1] == pytest.approx(backward.SHOWN * measured.step)
+    assert measured.times[-1] == pytest.approx(measured.end)
 
 
 def test_wrong_corrections_are_noticed():

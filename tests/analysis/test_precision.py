@@ -22,6 +22,15 @@ def in_c(body):
     return race.compiled(body, list(race.TABLEAUX), START, PARAMETERS)
 
 
+def test_times_of_the_solver_do_not_contain_its_set_up(body):
+    start = START.copy()
+    found = race.compiled(body, ["rk4"], start, PARAMETERS)
+    own, rk4 = (found.runners[name](0.05, 10, 1) for name in (race.OWN, "rk4"))
+    start *= 2  # what is set up for each measurement would begin here
+    assert (found.runners[race.OWN](0.05, 10, 1) == own).all()
+    assert not np.allclose(found.runners["rk4"](0.05, 10, 1), rk4)
+
+
 @pytest.mark.parametrize("method", race.TABLEAUX)
 def test_classical_method_in_c_is_the_one_in_python(body, in_c, method):
     field = solver(body, "numpy").vector_field
