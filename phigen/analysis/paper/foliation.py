@@ -6,12 +6,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from phigen import resources
 from phigen.analysis.arrays import Floats
 from phigen.analysis.drawing.leaf import Leaf, net
 from phigen.analysis.drawing.palette import PALETTE, SERIES, styled
 from phigen.analysis.measures import poisson_matrix
-from phigen.analysis.paper.plate import Finding, Plate, compiled
-from phigen.compiler import Compilation
+from phigen.analysis.paper.plate import Finding, Plate
+from phigen.api import load
+from phigen.geometry.system import System
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -23,11 +25,11 @@ SPHERES, PARABOLOIDS, PLANES = (0.1, 0.4, 1.0), (0.25, 1.5), (-2.0, 0.0, 2.0)
 
 def foliation_plate() -> Plate:
     """Three foliations side by side."""
-    systems = [compiled(name, 2)[0] for name in SYSTEMS]
-    parameters = {p.name: float(p.value) for p in systems[0].spec.parameters}
+    systems = [load(resources.bundled_specs() / f"{name}.yaml") for name in SYSTEMS]
+    parameters = {p.name: float(p.value) for p in systems[0].parameters}
 
-    def rank(compilation: Compilation, x: tuple[float, ...]) -> float:
-        return float(np.linalg.matrix_rank(poisson_matrix(compilation.system, parameters, np.array(x))))
+    def rank(system: System, x: tuple[float, ...]) -> float:
+        return float(np.linalg.matrix_rank(poisson_matrix(system, parameters, np.array(x))))
 
     body, species, _ = systems
     findings = (
@@ -40,28 +42,28 @@ def foliation_plate() -> Plate:
 
 
 @styled
-def _draw(systems: list[Compilation]) -> Figure:
+def _draw(systems: list[System]) -> Figure:
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(8.6, 3.1), layout="constrained")
     titles = ("so(3)*: spheres and the origin", "Lotka–Volterra: x1 x3 = C x2", "−x + y + z = C")
-    for index, (compilation, title, draw) in enumerate(
+    for index, (system, title, draw) in enumerate(
         zip(systems, titles, (_draw_spheres, _draw_paraboloids, _draw_planes), strict=True), start=1
     ):
         axes: Any = figure.add_subplot(1, 3, index, projection="3d")
-        draw(axes, compilation)
+        draw(axes, system)
         axes.set_box_aspect((1, 1, 1), zoom=0.92)
         axes.set_title(title)
-        for axis, name in zip("xyz", compilation.system.coordinates, strict=True):
+        for axis, name in zip("xyz", system.coordinates, strict=True):
             getattr(axes, f"set_{axis}label")(name, labelpad=-14)
             getattr(axes, f"set_{axis}ticks")([])
             getattr(axes, f"{axis}axis").pane.set_visible(False)
     return figure
 
 
-def _draw_spheres(axes: Any, compilation: Compilation) -> None:
+def _draw_spheres(axes: Any, system: System) -> None:
     """Nets of spheres, without what lies in front of the middle, so that the inner ones are seen."""
-    casimir, names = compilation.system.casimirs["C"], compilation.system.coordinates
+    casimir, names = system.casimirs["C"], system.coordinates
     box, gap = np.array([[-1.0] * 3, [1.0] * 3]), np.full((1, 3), np.nan)
     for level, colour in zip(SPHERES, SERIES, strict=False):
         for line in net(Leaf(casimir, names, {}, level), box * 1.05):
@@ -72,7 +74,7 @@ def _draw_spheres(axes: Any, compilation: Compilation) -> None:
     axes.view_init(22, -45)
 
 
-def _draw_paraboloids(axes: Any, compilation: Compilation) -> None:
+def _draw_paraboloids(axes: Any, system: System) -> None:
     """x2 = x1 x3/C in the positive octant."""
     for level, colour in zip(PARABOLOIDS, SERIES, strict=False):
         first, share = np.meshgrid(np.linspace(0.02, 1, 8), np.linspace(0.02, 1, 8))
@@ -82,7 +84,7 @@ def _draw_paraboloids(axes: Any, compilation: Compilation) -> None:
     axes.view_init(24, -40)
 
 
-def _draw_planes(axes: Any, compilation: Compilation) -> None:
+def _draw_planes(axes: Any, system: System) -> None:
     x, y = np.meshgrid(np.linspace(-1, 1, 5), np.linspace(-1, 1, 5))
     for level, colour in zip(PLANES, SERIES, strict=False):
         _draw_surface(axes, x, y, level + x - y, colour)
