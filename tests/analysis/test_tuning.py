@@ -188,6 +188,10 @@ def test_of_equally_cheap_methods_the_lowest_order_comes_first():
     found = ranking([finalist(10, 1.0), finalist(6, 1.04), finalist(4, 1.03, 5), finalist(2, 1.2), finalist(8, 1.01)])
     assert [f.curve.order for f in found] == [6, 10, 8, 4, 2]
     assert ranking([]) == []
+    gauged, plain = (
+        Finalist(Curve("a", 6, (), gauged=g), points(2, [1.0])[0], (1.0 - 0.01 * g,)) for g in (True, False)
+    )
+    assert ranking([gauged, plain]) == [plain, gauged]
 
 
 def tuner_of(grows, budget=1e6):

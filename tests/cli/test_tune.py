@@ -25,7 +25,7 @@ def paste(source, found):
 
 def test_pasted_lines_reach_the_accuracy_at_the_proposed_step(phigen, in_tmp):
     path = SPECS / "henon_heiles.yaml"
-    done = phigen("tune", path, "--accuracy", "1e-6", "--horizon", "500", "--budget", "4", "--json", "--plot", "w.svg")
+    done = phigen("tune", path, "--accuracy", "1e-6", "--horizon", "500", "--budget", "3", "--json", "--plot", "w.svg")
     assert done.exit_code == 0, done.stderr
     found = json.loads(done.stdout)
     best = found["winner"]
@@ -54,7 +54,7 @@ def test_table_names_the_proposal_and_the_lines(phigen):
 
 def test_accuracy_beyond_rounding_is_not_reached_and_that_is_explained(phigen):
     done = phigen(
-        "tune", SPECS / "henon_heiles.yaml", "--accuracy", "1e-15", "--horizon", "1e6", "--budget", "3", "--json"
+        "tune", SPECS / "henon_heiles.yaml", "--accuracy", "1e-15", "--horizon", "1e6", "--budget", "2", "--json"
     )
     assert done.exit_code == 5
     assert json.loads(done.stdout)["winner"] is None

@@ -106,10 +106,10 @@ def tune(
 
 
 def ranking(finalists: Sequence[Finalist]) -> list[Finalist]:
-    """By cost; of those that are as cheap as the best, as far as can be told, the one of lowest order comes first."""
+    """By cost; of those as cheap as the best, as far as can be told, the lowest order comes first, without gauge."""
     ranked = sorted(finalists, key=lambda f: f.cost)
     equal = [f for f in ranked if f.cost <= EQUAL * ranked[0].cost]
-    simple = min(equal, key=lambda f: (f.curve.order * max(f.curve.stages, 1), f.cost), default=None)
+    simple = min(equal, key=lambda f: (f.curve.order * max(f.curve.stages, 1), f.curve.gauged, f.cost), default=None)
     return [simple, *(f for f in ranked if f is not simple)] if simple else []
 
 
