@@ -11,6 +11,7 @@ from phigen.analysis.drawing.error_curves import windowed_maxima
 from phigen.analysis.drawing.groups import groups
 from phigen.analysis.drawing.leaf import leaf_of, net
 from phigen.analysis.drawing.palette import PALETTE, SERIES
+from phigen.analysis.drawing.section_plane import plane_of
 from phigen.analysis.figures import (
     error_figure,
     lyapunov_figure,
@@ -157,3 +158,8 @@ def test_without_matplotlib_the_extra_is_named(monkeypatch):
 def test_files_of_other_kinds_are_refused(tmp_path):
     with pytest.raises(ValueError, match="suffix"):
         save(error_figure({"a": spiral()}), tmp_path / "f.jpg")
+
+
+def test_section_of_an_orbit_that_closes_is_not_drawn_against_the_coordinate_of_the_section():
+    points = np.array([1e-13, -1.02, 0.06]) * (1 + 1e-14 * np.arange(5)[:, None])
+    assert plane_of(("m1", "m2", "m3"), points) == (1, 2)

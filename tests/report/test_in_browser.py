@@ -131,6 +131,16 @@ def test_prints_on_paper(browser):
     assert browser.pdf().startswith(b"%PDF")
 
 
+def test_paper_shows_what_is_folded(browser):
+    folded = "document.querySelectorAll('details:not([open])').length"
+    before = browser.value(folded)
+    assert before > 2
+    browser.value("dispatchEvent(new Event('beforeprint'))")
+    assert browser.value(folded) == 0
+    browser.value("dispatchEvent(new Event('afterprint'))")
+    assert browser.value(folded) == before
+
+
 @pytest.mark.parametrize("width", [360, 1100])
 def test_nothing_sticks_out_sideways(browser, width):
     browser.size(width, 800)

@@ -23,7 +23,10 @@ def plane_of(names: Sequence[str], points: Floats) -> tuple[int, int]:
     constant = span <= _CONSTANT * max(float(span.max()), float(np.max(np.abs(points), initial=0.0)) * 1e-4)
     varying = [name for name, fixed in zip(names, constant, strict=True) if not fixed]
     pairs = [found for group in groups(names) if len(found := [n for n in group if n in varying]) >= 2]
-    chosen = (pairs[0] if pairs else [*varying, *(n for n in names if n not in varying)])[:2]
+    # Of an orbit that closes there is one point; a coordinate that is zero is likely to be that of the section.
+    sizes = np.max(np.abs(points), axis=0, initial=0.0)
+    rest = sorted((n for n in names if n not in varying), key=lambda n: -sizes[list(names).index(n)])
+    chosen = (pairs[0] if pairs else [*varying, *rest])[:2]
     first, second = sorted(map(list(names).index, chosen))
     return first, second
 
