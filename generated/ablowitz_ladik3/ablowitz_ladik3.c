@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 63c374cc5877f33939097d9cc89b8a3fa7ec9831c309d975bfc30ab2aa032709
+ * body-sha256: 41d41cc27b4ba63d2cf37733353cc33a4d9d139946d8e67e1fb61d5ac0377451
  */
 #include "ablowitz_ladik3.h"
 
@@ -252,7 +252,7 @@ static void ablowitz_ladik3_fit(ablowitz_ladik3_memory *memory)
     memory->fitting = 1;
     ++memory->fits;
     memory->slow = 0;
-    memory->patience = memory->patience < 10000 ? 2 * memory->patience + 96 : 20000;
+    memory->patience = memory->patience < 10000 ? 2 * memory->patience + 1000 : 20000;
 }
 
 /* Take in the solved value: what took one iteration needs no better guess. */
@@ -537,6 +537,7 @@ static ablowitz_ladik3_status ablowitz_ladik3_set_step(ablowitz_ladik3_solver *s
     for (int stage = 0; stage < 5; ++stage)
         ablowitz_ladik3_prepare(&s->params, ablowitz_ladik3_fractions[stage] * h, s->coef[stage]);
     memset(s->memory, 0, sizeof s->memory);
+    for (int stage = 0; stage < 5; ++stage) s->memory[stage].patience = 1000;
     s->h = h;
     s->ready = 1;
     return ablowitz_ladik3_OK;

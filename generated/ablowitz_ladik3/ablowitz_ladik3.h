@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 7471bb5d8a38a4e9f19ee9d32b2513a2fa7ad3e0a6e1d2efeb4fab1e1df3c4f2
+ * body-sha256: c12f1b6110bf4615c378419b0d8901cadf7ba3a986db4d6496d82d50c230eedc
  */
 #ifndef ABLOWITZ_LADIK3_H
 #define ABLOWITZ_LADIK3_H
@@ -82,7 +82,7 @@ ablowitz_ladik3_status ablowitz_ladik3_step(ablowitz_ladik3_solver *s, double h)
 /* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 ablowitz_ladik3_status ablowitz_ladik3_integrate(ablowitz_ladik3_solver *s, double h, size_t steps);
 
-/* Many members, each integrated by itself, in place: x[i * members + m] is coordinate i of member m.
+/* Many members, in place: x[i * members + m] is coordinate i of member m. Each is integrated by itself.
    status (or NULL) receives the status of each member; a failed member keeps its last good state.
    Returns the first status that is not OK. */
 ablowitz_ladik3_status ablowitz_ladik3_ensemble(const ablowitz_ladik3_params *params, double *x,

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: ab459b3c29aced32d70f003cbb4c8ffb0d379c32efa3b19d70828473bbf1672d
+ * body-sha256: 0a636e9a97898656b2c5fe4544d78a8aba934994319f8a98431140e97f9abc4c
  */
 #include "charged_particle.h"
 
@@ -268,7 +268,7 @@ static void charged_particle_fit(charged_particle_memory *memory)
     memory->fitting = 1;
     ++memory->fits;
     memory->slow = 0;
-    memory->patience = memory->patience < 10000 ? 2 * memory->patience + 96 : 20000;
+    memory->patience = memory->patience < 10000 ? 2 * memory->patience + 1000 : 20000;
 }
 
 /* Take in the solved value: what took one iteration needs no better guess. */
@@ -531,6 +531,7 @@ static charged_particle_status charged_particle_set_step(charged_particle_solver
     for (int stage = 0; stage < 1; ++stage)
         charged_particle_prepare(&s->params, charged_particle_fractions[stage] * h, s->coef[stage]);
     memset(s->memory, 0, sizeof s->memory);
+    for (int stage = 0; stage < 1; ++stage) s->memory[stage].patience = 1000;
     s->h = h;
     s->ready = 1;
     return charged_particle_OK;

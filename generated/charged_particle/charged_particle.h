@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: e30889c1dad9aad818818626630e6435f59259942a653fe3c0858741a1303a55
+ * body-sha256: 00933d4fa3f650cdf6e2bebbf92249d6b56f309697832f7c5e21cd9f6ff8791d
  */
 #ifndef CHARGED_PARTICLE_H
 #define CHARGED_PARTICLE_H
@@ -81,7 +81,7 @@ charged_particle_status charged_particle_step(charged_particle_solver *s, double
 /* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 charged_particle_status charged_particle_integrate(charged_particle_solver *s, double h, size_t steps);
 
-/* Many members, each integrated by itself, in place: x[i * members + m] is coordinate i of member m.
+/* Many members, in place: x[i * members + m] is coordinate i of member m. Each is integrated by itself.
    status (or NULL) receives the status of each member; a failed member keeps its last good state.
    Returns the first status that is not OK. */
 charged_particle_status charged_particle_ensemble(const charged_particle_params *params, double *x,

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 29178d59b544e614160f01426bde2c1feeaac6ec1b59d7e9d7bbbb3bcfdae50d
+ * body-sha256: 28c73cdd201cf030b995c13d225e5f4b4360792aa12e0ea0c6c07aef816bec69
  */
 #ifndef CYCLOTRON_H
 #define CYCLOTRON_H
@@ -87,7 +87,8 @@ cyclotron_status cyclotron_step(cyclotron_solver *s, double h);
 /* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 cyclotron_status cyclotron_integrate(cyclotron_solver *s, double h, size_t steps);
 
-/* Many members, each integrated by itself, in place: x[i * members + m] is coordinate i of member m.
+/* Many members, in place: x[i * members + m] is coordinate i of member m. 8 are integrated
+   side by side, and with OpenMP such groups in parallel.
    status (or NULL) receives the status of each member; a failed member keeps its last good state.
    Returns the first status that is not OK. */
 cyclotron_status cyclotron_ensemble(const cyclotron_params *params, double *x, size_t members, double h,

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 71bc799bf2d59664a530101ec4678b9fb5f03d530f841122e7d998abc9e45713
+ * body-sha256: aed30dd4ed5495df2172fc6492278a60346962e32c7085ac22d940371221c68f
  */
 #include "engel_geodesics.h"
 
@@ -283,7 +283,7 @@ static void engel_geodesics_fit(engel_geodesics_memory *memory)
     memory->fitting = 1;
     ++memory->fits;
     memory->slow = 0;
-    memory->patience = memory->patience < 10000 ? 2 * memory->patience + 96 : 20000;
+    memory->patience = memory->patience < 10000 ? 2 * memory->patience + 1000 : 20000;
 }
 
 /* Take in the solved value: what took one iteration needs no better guess. */
@@ -406,6 +406,7 @@ static engel_geodesics_status engel_geodesics_set_step(engel_geodesics_solver *s
     for (int stage = 0; stage < 1; ++stage)
         engel_geodesics_prepare(&s->params, engel_geodesics_fractions[stage] * h, s->coef[stage]);
     memset(s->memory, 0, sizeof s->memory);
+    for (int stage = 0; stage < 1; ++stage) s->memory[stage].patience = 1000;
     s->pause = 16;
     s->setback = s->foreseeing = 0;
     s->doubt = s->retry = 0;
@@ -647,6 +648,33 @@ static void engel_geodesics_sizes(engel_geodesics_lanes y[restrict 4], engel_geo
     }
 }
 
+/* Correct y by the residuals, with the inverse in the table, and measure the corrections. */
+static void engel_geodesics_correct(engel_geodesics_lines *line, engel_geodesics_lanes size)
+{
+    engel_geodesics_lanes delta[4];
+    memset(delta, 0, sizeof delta);
+    for (int i = 0; i < 4; ++i)
+        for (int j = 0; j < 4; ++j) {
+            engel_geodesics_EACH_LANE
+            for (int lane = 0; lane < engel_geodesics_LANES; ++lane)
+                delta[i][lane] += line->inverse[i * 4 + j][lane] * line->residual[j][lane];
+        }
+    engel_geodesics_sizes(line->y, delta, size);
+    for (int i = 0; i < 4; ++i)
+        for (int lane = 0; lane < engel_geodesics_LANES; ++lane) line->y[i][lane] -= delta[i][lane];
+}
+
+/* The largest size; infinite if one is not finite. */
+static double engel_geodesics_largest(const engel_geodesics_lanes size)
+{
+    double largest = 0.0, total = 0.0;
+    for (int lane = 0; lane < engel_geodesics_LANES; ++lane) {
+        total += size[lane];
+        largest = size[lane] > largest ? size[lane] : largest;
+    }
+    return isfinite(total) ? largest : HUGE_VAL;
+}
+
 /* The steps of a block one after the other, each along the lines of its lane. As X, the state with its carry, gains
    increment - gain residual, the next residual follows from this one; X itself is added up apart. */
 static void engel_geodesics_chain(engel_geodesics_lines line[1], double x[4], double carry[4])
@@ -709,28 +737,6 @@ static void engel_geodesics_foresee(const engel_geodesics_memory *memory, engel_
     }
 }
 
-/* Correct y by the residuals that the chain found. The largest size of a correction; infinite if one is not finite. */
-static double engel_geodesics_correct(engel_geodesics_lines *line)
-{
-    engel_geodesics_lanes size, delta[4];
-    double largest = 0.0, total = 0.0;
-    memset(delta, 0, sizeof delta);
-    for (int i = 0; i < 4; ++i)
-        for (int j = 0; j < 4; ++j) {
-            engel_geodesics_EACH_LANE
-            for (int lane = 0; lane < engel_geodesics_LANES; ++lane)
-                delta[i][lane] += line->inverse[i * 4 + j][lane] * line->residual[j][lane];
-        }
-    engel_geodesics_sizes(line->y, delta, size);
-    for (int i = 0; i < 4; ++i)
-        for (int lane = 0; lane < engel_geodesics_LANES; ++lane) line->y[i][lane] -= delta[i][lane];
-    for (int lane = 0; lane < engel_geodesics_LANES; ++lane) {
-        total += size[lane];
-        largest = size[lane] > largest ? size[lane] : largest;
-    }
-    return isfinite(total) ? largest : HUGE_VAL;
-}
-
 /* Guesses where no recurrence is known: midpoints of steps by the classical Runge-Kutta method. */
 static void engel_geodesics_march(const engel_geodesics_solver *s, engel_geodesics_lines line[1])
 {
@@ -760,6 +766,7 @@ static void engel_geodesics_march(const engel_geodesics_solver *s, engel_geodesi
 static int engel_geodesics_block(engel_geodesics_solver *s, engel_geodesics_table *table, int most)
 {
     engel_geodesics_lines line[1];
+    engel_geodesics_lanes sizes;
     double x[4], carry[4], value[4], previous = HUGE_VAL;
     int passes = 0, solved = 0;
     if (!s->foreseeing) engel_geodesics_march(s, line);
@@ -771,7 +778,10 @@ static int engel_geodesics_block(engel_geodesics_solver *s, engel_geodesics_tabl
         memcpy(x, s->x, sizeof x);
         memcpy(carry, s->carry, sizeof carry);
         engel_geodesics_chain(line, x, carry);
-        for (int stage = 0; stage < 1; ++stage) size = fmax(size, engel_geodesics_correct(&line[stage]));
+        for (int stage = 0; stage < 1; ++stage) {
+            engel_geodesics_correct(&line[stage], sizes);
+            size = fmax(size, engel_geodesics_largest(sizes));
+        }
         s->evaluations += 1 * engel_geodesics_LANES;
         const double growth = size / (previous * previous);
         /* The second test: after the square of so small a correction there is rounding only. */
@@ -796,7 +806,8 @@ static int engel_geodesics_block(engel_geodesics_solver *s, engel_geodesics_tabl
     return passes;
 }
 
-/* How the next block is guessed: by recurrences once they are fitted, which takes a thousand steps to repay. */
+/* How the next block is guessed: by recurrences, fitted as soon as enough steps are to be made, or
+   have been, to repay that. */
 static void engel_geodesics_choose_guess(engel_geodesics_solver *s, size_t steps)
 {
     for (int stage = 0; stage < 1; ++stage)
@@ -804,7 +815,7 @@ static void engel_geodesics_choose_guess(engel_geodesics_solver *s, size_t steps
             s->foreseeing = 0;
             return;
         }
-    if (s->foreseeing || steps < 1000 || s->steps < s->retry) return;
+    if (s->foreseeing || (steps < 4000 && s->steps < 4000) || s->steps < s->retry) return;
     for (int stage = 0; stage < 1; ++stage) engel_geodesics_fit(&s->memory[stage]);
     s->foreseeing = 1;
     s->pause = engel_geodesics_LANES;
@@ -816,7 +827,7 @@ static void engel_geodesics_learn_from(engel_geodesics_solver *s, int passes)
 {
     if (s->foreseeing && (passes == 0 || (passes > 1 && passes >= s->passes))) {
         s->foreseeing = 0;
-        s->doubt = 2 * s->doubt + 2000;
+        s->doubt = 2 * s->doubt + 4000;
         s->retry = s->steps + s->doubt;
     } else if (passes == 0) {
         s->setback = 2 * s->setback + engel_geodesics_LANES > 1000 ? 1000 : 2 * s->setback + engel_geodesics_LANES;
@@ -859,22 +870,288 @@ engel_geodesics_status engel_geodesics_integrate(engel_geodesics_solver *s, doub
     return status;
 }
 
+/* Members of an ensemble, each in its lane. */
+typedef struct {
+    engel_geodesics_lanes x[4], carry[4], coef[1][3];
+    engel_geodesics_lanes past[1][96][4]; /* solved values, in a ring */
+    engel_geodesics_lanes weight[1][32][4]; /* of past values, the latest first, for the next */
+    int latest;     /* the row of the latest values */
+    int count;      /* rows in use */
+    int order[1];   /* how many of them the extrapolation uses */
+    int fits;       /* how often recurrences have been fitted */
+    int fitting[1]; /* whether they are the better guess */
+    int slow;       /* how many of the last steps took more than one iteration */
+    int patience;   /* how many of those before recurrences are fitted again */
+    int active[8];  /* whether the lane has a member that has not failed */
+    size_t left[8]; /* steps that it has still to make */
+} engel_geodesics_group;
+
+/* The past values of a stage, the latest for k = 0. */
+static engel_geodesics_lanes *engel_geodesics_group_past(engel_geodesics_group *group, int stage, int k)
+{
+    return group->past[stage][(group->latest + k) % 96];
+}
+
+/* Guess the values of a stage by the recurrences of the members. */
+static void engel_geodesics_group_foresee(engel_geodesics_group *group, int stage, engel_geodesics_lanes y[restrict 4])
+{
+    memset(y, 0, 4 * sizeof y[0]);
+    for (int k = 0; k < 32; ++k) {
+        engel_geodesics_lanes *past = engel_geodesics_group_past(group, stage, k), *weight = group->weight[stage][k];
+        for (int i = 0; i < 4; ++i) {
+            engel_geodesics_EACH_LANE
+            for (int lane = 0; lane < engel_geodesics_LANES; ++lane) y[i][lane] += weight[i][lane] * past[i][lane];
+        }
+    }
+}
+
+/* Extrapolate the values of a stage. */
+static void engel_geodesics_group_extrapolate(engel_geodesics_group *group, int stage, engel_geodesics_lanes y[restrict 4])
+{
+    const int order = group->order[stage];
+    double binomial = -1.0;
+    memcpy(y, group->x, 4 * sizeof y[0]);
+    if (order > 0) memset(y, 0, 4 * sizeof y[0]);
+    for (int k = 0; k < order; ++k) {
+        engel_geodesics_lanes *past = engel_geodesics_group_past(group, stage, k);
+        binomial *= -(double)(order - k) / (k + 1);
+        for (int i = 0; i < 4; ++i) {
+            engel_geodesics_EACH_LANE
+            for (int lane = 0; lane < engel_geodesics_LANES; ++lane) y[i][lane] += binomial * past[i][lane];
+        }
+    }
+}
+
+/* The sum over members of the absolute values of all components. */
+static double engel_geodesics_group_sum(const engel_geodesics_group *group, engel_geodesics_lanes y[4])
+{
+    double sum = 0.0;
+    for (int i = 0; i < 4; ++i)
+        for (int lane = 0; lane < engel_geodesics_LANES; ++lane) sum += group->active[lane] ? fabs(y[i][lane]) : 0.0;
+    return sum;
+}
+
+static void engel_geodesics_group_subtract(engel_geodesics_lanes y[restrict 4], engel_geodesics_lanes other[restrict 4])
+{
+    for (int i = 0; i < 4; ++i) {
+        engel_geodesics_EACH_LANE
+        for (int lane = 0; lane < engel_geodesics_LANES; ++lane) y[i][lane] -= other[i][lane];
+    }
+}
+
+/* Choose the guess that would have been best for these values. */
+static void engel_geodesics_group_judge(engel_geodesics_group *group, int stage, engel_geodesics_lanes y[4])
+{
+    engel_geodesics_lanes row[8 + 1][4];
+    const int rows = group->count < 8 ? group->count : 8;
+    double least = HUGE_VAL;
+    memcpy(row[0], y, sizeof row[0]);
+    for (int k = 0; k < rows; ++k) memcpy(row[k + 1], engel_geodesics_group_past(group, stage, k), sizeof row[0]);
+    if (group->order[stage] == 0) group->order[stage] = 1;
+    for (int order = 1; order <= rows; ++order) { /* row[0] becomes the backward difference of this order */
+        for (int k = 0; k <= rows - order; ++k) engel_geodesics_group_subtract(row[k], row[k + 1]);
+        const double size = engel_geodesics_group_sum(group, row[0]);
+        if (size < least) {
+            least = size;
+            group->order[stage] = order;
+        }
+    }
+    if (group->fits == 0) return;
+    engel_geodesics_group_foresee(group, stage, row[0]);
+    engel_geodesics_group_subtract(row[0], y);
+    group->fitting[stage] = engel_geodesics_group_sum(group, row[0]) <= least;
+}
+
+/* Fit the recurrences of all members; with every time, wait longer before it is done again. */
+static void engel_geodesics_group_fit(engel_geodesics_group *group)
+{
+    engel_geodesics_memory memory;
+    memory.count = 96;
+    for (int stage = 0; stage < 1; ++stage)
+        for (int lane = 0; lane < engel_geodesics_LANES; ++lane) {
+            for (int i = 0; i < 4; ++i) {
+                for (int k = 0; k < 96; ++k)
+                    memory.past[96 - 1 - k][i] = engel_geodesics_group_past(group, stage, k)[i][lane];
+                if (group->active[lane]) engel_geodesics_train(&memory, i);
+                for (int k = 0; k < 32 && group->active[lane]; ++k)
+                    group->weight[stage][k][i][lane] = memory.weight[k][i][0];
+            }
+            group->fitting[stage] = 1;
+        }
+    ++group->fits;
+    group->slow = 0;
+    group->patience = group->patience < 10000 ? 2 * group->patience + 1000 : 20000;
+}
+
+/* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group. */
+static int engel_geodesics_group_open(engel_geodesics_group *group, const engel_geodesics_lanes size, const engel_geodesics_lanes previous)
+{
+    int open = 0;
+    for (int lane = 0; lane < engel_geodesics_LANES; ++lane) {
+        const double growth = size[lane] / (previous[lane] * previous[lane]);
+        const double remaining = size[lane] * size[lane] * (growth > 1.0 ? growth : 1.0);
+        const int solved = remaining <= 1e-20 || (previous[lane] < 1e-8 && size[lane] < 1e-10);
+        if (!isfinite(size[lane])) group->active[lane] = 0;
+        open += group->active[lane] && !solved;
+    }
+    return open;
+}
+
+/* Newton's method for a stage, until the slowest lane is solved. The number of iterations; where that is the most
+   allowed, lanes that are not solved leave the group. */
+static int engel_geodesics_group_solve(engel_geodesics_group *group, int stage, engel_geodesics_lines *line)
+{
+    engel_geodesics_lanes size, previous;
+    int iterations = 0, open = 1;
+    for (int lane = 0; lane < engel_geodesics_LANES; ++lane) size[lane] = HUGE_VAL;
+    if (group->fitting[stage]) engel_geodesics_group_foresee(group, stage, line->y);
+    else engel_geodesics_group_extrapolate(group, stage, line->y);
+    for (; open > 0 && iterations < 20; ++iterations) {
+        memcpy(previous, size, sizeof size);
+        engel_geodesics_tabulate(group->coef[stage], line);
+        for (int i = 0; i < 4; ++i) {
+            engel_geodesics_EACH_LANE
+            for (int lane = 0; lane < engel_geodesics_LANES; ++lane)
+                line->residual[i][lane] =
+                    ((line->y[i][lane] - group->x[i][lane]) + line->displacement[i][lane]) - group->carry[i][lane];
+        }
+        engel_geodesics_correct(line, size);
+        open = engel_geodesics_group_open(group, size, previous);
+    }
+    for (int lane = 0; lane < engel_geodesics_LANES && open > 0; ++lane)
+        group->active[lane] = group->active[lane] && size[lane] * size[lane] <= 1e-20;
+    return iterations;
+}
+
+/* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
+static void engel_geodesics_group_advance(engel_geodesics_lanes x[restrict 4], engel_geodesics_lanes carry[restrict 4],
+    engel_geodesics_lines *line)
+{
+    for (int i = 0; i < 4; ++i)
+        for (int j = 0; j < 4; ++j) {
+            engel_geodesics_EACH_LANE
+            for (int lane = 0; lane < engel_geodesics_LANES; ++lane)
+                carry[i][lane] -= line->gain[i * 4 + j][lane] * line->residual[j][lane];
+        }
+    for (int i = 0; i < 4; ++i) {
+        engel_geodesics_EACH_LANE
+        for (int lane = 0; lane < engel_geodesics_LANES; ++lane) {
+            const double change = line->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
+            const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
+            x[i][lane] = sum + small;
+            carry[i][lane] = small - (x[i][lane] - sum);
+        }
+    }
+}
+
+/* One step of all members. One that fails keeps its state, and leaves. How many are left. */
+static int engel_geodesics_group_step(engel_geodesics_group *group)
+{
+    engel_geodesics_lanes x[4], carry[4];
+    engel_geodesics_lines line;
+    const int next = (group->latest + 96 - 1) % 96;
+    int active = 0, most = 0;
+    memcpy(x, group->x, sizeof x);
+    memcpy(carry, group->carry, sizeof carry);
+    for (int stage = 0; stage < 1; ++stage) {
+        const int iterations = engel_geodesics_group_solve(group, stage, &line);
+        engel_geodesics_group_advance(group->x, group->carry, &line);
+        if (next % 8 == 0 || group->count < 8) engel_geodesics_group_judge(group, stage, line.y);
+        if (iterations > most) most = iterations;
+        memcpy(group->past[stage][next], line.y, sizeof line.y);
+    }
+    group->latest = next;
+    if (group->count < 96) ++group->count;
+    group->slow = most > 1 ? group->slow + 1 : 0;
+    if (group->slow > group->patience && group->count == 96) engel_geodesics_group_fit(group);
+    for (int lane = 0; lane < engel_geodesics_LANES; ++lane) {
+        for (int i = 0; i < 4; ++i)
+            if (!isfinite(group->x[i][lane])) group->active[lane] = 0;
+        for (int i = 0; i < 4 && !group->active[lane]; ++i) {
+            group->x[i][lane] = x[i][lane];
+            group->carry[i][lane] = carry[i][lane];
+        }
+        group->left[lane] -= group->active[lane] != 0;
+        active += group->active[lane] != 0;
+    }
+    return active;
+}
+
+/* Put a member into a lane: its state, and its coefficients. */
+static engel_geodesics_status engel_geodesics_group_join(engel_geodesics_group *group, int lane, const engel_geodesics_params *params,
+    const double x0[4], double h)
+{
+    engel_geodesics_solver s;
+    engel_geodesics_status status = engel_geodesics_init(&s, params, x0);
+    if (status == engel_geodesics_OK) status = engel_geodesics_set_step(&s, h);
+    if (status != engel_geodesics_OK) return status;
+    for (int i = 0; i < 4; ++i) group->x[i][lane] = s.x[i];
+    for (int stage = 0; stage < 1; ++stage)
+        for (int k = 0; k < 3; ++k) group->coef[stage][k][lane] = s.coef[stage][k];
+    group->active[lane] = 1;
+    return status;
+}
+
+/* The steps that a member has still to make after it left the group, by itself. */
+static engel_geodesics_status engel_geodesics_group_finish(const engel_geodesics_group *group, int lane, const engel_geodesics_params *params,
+    double x[4], double h)
+{
+    engel_geodesics_solver s;
+    engel_geodesics_status status = engel_geodesics_init(&s, params, x);
+    if (status != engel_geodesics_OK) return status;
+    for (int i = 0; i < 4; ++i) s.carry[i] = group->carry[i][lane];
+    status = engel_geodesics_integrate(&s, h, group->left[lane]);
+    memcpy(x, s.x, sizeof s.x);
+    return status;
+}
+
+/* The members from first on, as many as there are lanes. The first status that is not OK. */
+static engel_geodesics_status engel_geodesics_group_run(const engel_geodesics_params *params, double *x, size_t members, size_t first,
+    double h, size_t steps, unsigned char *status)
+{
+    engel_geodesics_group group;
+    engel_geodesics_status worst = engel_geodesics_OK, member[8];
+    const int count = members - first < engel_geodesics_LANES ? (int)(members - first) : engel_geodesics_LANES;
+    double state[4];
+    memset(&group, 0, sizeof group);
+    group.patience = 1000;
+    for (int lane = 0; lane < count; ++lane) {
+        for (size_t i = 0; i < 4; ++i) state[i] = x[i * members + first + (size_t)lane];
+        group.left[lane] = steps;
+        member[lane] = engel_geodesics_group_join(&group, lane, params, state, h);
+    }
+    for (size_t k = 0; k < steps && engel_geodesics_group_step(&group) > 2; ++k) continue;
+    for (int lane = 0; lane < count; ++lane) {
+        for (int i = 0; i < 4; ++i) state[i] = group.x[i][lane];
+        if (member[lane] == engel_geodesics_OK) {
+            if (group.left[lane] > 0) member[lane] = engel_geodesics_group_finish(&group, lane, params, state, h);
+            for (size_t i = 0; i < 4; ++i) x[i * members + first + (size_t)lane] = state[i];
+        }
+        if (status != NULL) status[first + (size_t)lane] = (unsigned char)member[lane];
+        if (worst == engel_geodesics_OK) worst = member[lane];
+    }
+    return worst;
+}
+
 engel_geodesics_status engel_geodesics_ensemble(const engel_geodesics_params *params, double *x,
                                                 size_t members, double h, size_t steps, unsigned char *status)
 {
     engel_geodesics_status worst = engel_geodesics_OK;
+    size_t earliest = members;
     if (x == NULL && members > 0) return engel_geodesics_BAD_ARGUMENT;
-    for (size_t m = 0; m < members; ++m) {
-        engel_geodesics_solver s;
-        double x0[4];
-        for (size_t i = 0; i < 4; ++i) x0[i] = x[i * members + m];
-        engel_geodesics_status member = engel_geodesics_init(&s, params, x0);
-        if (member == engel_geodesics_OK) {
-            member = engel_geodesics_integrate(&s, h, steps);
-            for (size_t i = 0; i < 4; ++i) x[i * members + m] = s.x[i];
+#ifdef _OPENMP
+#pragma omp parallel for schedule(dynamic)
+#endif
+    for (size_t first = 0; first < members; first += engel_geodesics_LANES) {
+        const engel_geodesics_status group = engel_geodesics_group_run(params, x, members, first, h, steps, status);
+        if (group == engel_geodesics_OK) continue;
+#ifdef _OPENMP
+#pragma omp critical
+#endif
+        if (first < earliest) {
+            earliest = first;
+            worst = group;
         }
-        if (status != NULL) status[m] = (unsigned char)member;
-        if (worst == engel_geodesics_OK) worst = member;
     }
     return worst;
 }

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: ed937f6ae1a6b53358e3a79899739475498d77cd98637016e6011058c8102809
+ * body-sha256: a8293d59b3676237efd8ea292cc5685815291db2ea62929bebc5bee282253a0a
  */
 #ifndef ENGEL_GEODESICS_H
 #define ENGEL_GEODESICS_H
@@ -88,7 +88,8 @@ engel_geodesics_status engel_geodesics_step(engel_geodesics_solver *s, double h)
 /* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 engel_geodesics_status engel_geodesics_integrate(engel_geodesics_solver *s, double h, size_t steps);
 
-/* Many members, each integrated by itself, in place: x[i * members + m] is coordinate i of member m.
+/* Many members, in place: x[i * members + m] is coordinate i of member m. 8 are integrated
+   side by side, and with OpenMP such groups in parallel.
    status (or NULL) receives the status of each member; a failed member keeps its last good state.
    Returns the first status that is not OK. */
 engel_geodesics_status engel_geodesics_ensemble(const engel_geodesics_params *params, double *x,

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 70088c665b2100fb458ae496031cbc8b579dc35b9fdf02a3eba9328e5bfdaae1
+ * body-sha256: 49b2081e02f4ab7bb9b50d206cd72624077c1e082c6a84e913fac8d854b66477
  */
 #ifndef GAUSSIAN_MOMENTS_H
 #define GAUSSIAN_MOMENTS_H
@@ -89,7 +89,8 @@ gaussian_moments_status gaussian_moments_step(gaussian_moments_solver *s, double
 /* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 gaussian_moments_status gaussian_moments_integrate(gaussian_moments_solver *s, double h, size_t steps);
 
-/* Many members, each integrated by itself, in place: x[i * members + m] is coordinate i of member m.
+/* Many members, in place: x[i * members + m] is coordinate i of member m. 8 are integrated
+   side by side, and with OpenMP such groups in parallel.
    status (or NULL) receives the status of each member; a failed member keeps its last good state.
    Returns the first status that is not OK. */
 gaussian_moments_status gaussian_moments_ensemble(const gaussian_moments_params *params, double *x,

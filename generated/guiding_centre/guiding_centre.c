@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 3da7f4f16935a92ba64494a269946f820e0ae8d991c7c368ce5577c157f66848
+ * body-sha256: 9585ad843a5659de1f2f67d6d7bb6e7fb7b6dab22edc3160e0760d31ff13e102
  */
 #include "guiding_centre.h"
 
@@ -263,7 +263,7 @@ static void guiding_centre_fit(guiding_centre_memory *memory)
     memory->fitting = 1;
     ++memory->fits;
     memory->slow = 0;
-    memory->patience = memory->patience < 10000 ? 2 * memory->patience + 96 : 20000;
+    memory->patience = memory->patience < 10000 ? 2 * memory->patience + 1000 : 20000;
 }
 
 /* Take in the solved value: what took one iteration needs no better guess. */
@@ -640,6 +640,7 @@ static guiding_centre_status guiding_centre_set_step(guiding_centre_solver *s, d
     for (int stage = 0; stage < 5; ++stage)
         guiding_centre_prepare(&s->params, guiding_centre_fractions[stage] * h, s->coef[stage]);
     memset(s->memory, 0, sizeof s->memory);
+    for (int stage = 0; stage < 5; ++stage) s->memory[stage].patience = 1000;
     s->h = h;
     s->ready = 1;
     return guiding_centre_OK;

@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: a571aacbcece27405a0f55ca0299f6433b0de8673926f9762ca7921dfacd8cec
+ * body-sha256: 1e9c73be19dd9193660c24f818565e0d565e30263e3502a2a46da0cb773d880a
  */
 #ifndef GUIDING_CENTRE_H
 #define GUIDING_CENTRE_H
@@ -84,7 +84,7 @@ guiding_centre_status guiding_centre_step(guiding_centre_solver *s, double h);
 /* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 guiding_centre_status guiding_centre_integrate(guiding_centre_solver *s, double h, size_t steps);
 
-/* Many members, each integrated by itself, in place: x[i * members + m] is coordinate i of member m.
+/* Many members, in place: x[i * members + m] is coordinate i of member m. Each is integrated by itself.
    status (or NULL) receives the status of each member; a failed member keeps its last good state.
    Returns the first status that is not OK. */
 guiding_centre_status guiding_centre_ensemble(const guiding_centre_params *params, double *x, size_t members,

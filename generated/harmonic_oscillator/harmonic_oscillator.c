@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 7fffb79550b1ec6739aa2b41c5db62c1e5ee652eeb9825e313f857b289bf2228
+ * body-sha256: a4e5d9fe80fd905aa50d9d40ffad67130aee91d0fa593dc7e6596fe59048e4f1
  */
 #include "harmonic_oscillator.h"
 
@@ -221,7 +221,7 @@ static void harmonic_oscillator_fit(harmonic_oscillator_memory *memory)
     memory->fitting = 1;
     ++memory->fits;
     memory->slow = 0;
-    memory->patience = memory->patience < 10000 ? 2 * memory->patience + 96 : 20000;
+    memory->patience = memory->patience < 10000 ? 2 * memory->patience + 1000 : 20000;
 }
 
 /* Take in the solved value: what took one iteration needs no better guess. */
@@ -345,6 +345,7 @@ static harmonic_oscillator_status harmonic_oscillator_set_step(harmonic_oscillat
     for (int stage = 0; stage < 1; ++stage)
         harmonic_oscillator_prepare(&s->params, harmonic_oscillator_fractions[stage] * h, s->coef[stage]);
     memset(s->memory, 0, sizeof s->memory);
+    for (int stage = 0; stage < 1; ++stage) s->memory[stage].patience = 1000;
     s->pause = 16;
     s->setback = s->foreseeing = 0;
     s->doubt = s->retry = 0;
@@ -483,6 +484,33 @@ static void harmonic_oscillator_sizes(harmonic_oscillator_lanes y[restrict 2], h
     }
 }
 
+/* Correct y by the residuals, with the inverse in the table, and measure the corrections. */
+static void harmonic_oscillator_correct(harmonic_oscillator_lines *line, harmonic_oscillator_lanes size)
+{
+    harmonic_oscillator_lanes delta[2];
+    memset(delta, 0, sizeof delta);
+    for (int i = 0; i < 2; ++i)
+        for (int j = 0; j < 2; ++j) {
+            harmonic_oscillator_EACH_LANE
+            for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane)
+                delta[i][lane] += line->inverse[i * 2 + j][lane] * line->residual[j][lane];
+        }
+    harmonic_oscillator_sizes(line->y, delta, size);
+    for (int i = 0; i < 2; ++i)
+        for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane) line->y[i][lane] -= delta[i][lane];
+}
+
+/* The largest size; infinite if one is not finite. */
+static double harmonic_oscillator_largest(const harmonic_oscillator_lanes size)
+{
+    double largest = 0.0, total = 0.0;
+    for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane) {
+        total += size[lane];
+        largest = size[lane] > largest ? size[lane] : largest;
+    }
+    return isfinite(total) ? largest : HUGE_VAL;
+}
+
 /* The steps of a block one after the other, each along the lines of its lane. As X, the state with its carry, gains
    increment - gain residual, the next residual follows from this one; X itself is added up apart. */
 static void harmonic_oscillator_chain(harmonic_oscillator_lines line[1], double x[2], double carry[2])
@@ -545,28 +573,6 @@ static void harmonic_oscillator_foresee(const harmonic_oscillator_memory *memory
     }
 }
 
-/* Correct y by the residuals that the chain found. The largest size of a correction; infinite if one is not finite. */
-static double harmonic_oscillator_correct(harmonic_oscillator_lines *line)
-{
-    harmonic_oscillator_lanes size, delta[2];
-    double largest = 0.0, total = 0.0;
-    memset(delta, 0, sizeof delta);
-    for (int i = 0; i < 2; ++i)
-        for (int j = 0; j < 2; ++j) {
-            harmonic_oscillator_EACH_LANE
-            for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane)
-                delta[i][lane] += line->inverse[i * 2 + j][lane] * line->residual[j][lane];
-        }
-    harmonic_oscillator_sizes(line->y, delta, size);
-    for (int i = 0; i < 2; ++i)
-        for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane) line->y[i][lane] -= delta[i][lane];
-    for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane) {
-        total += size[lane];
-        largest = size[lane] > largest ? size[lane] : largest;
-    }
-    return isfinite(total) ? largest : HUGE_VAL;
-}
-
 /* Guesses where no recurrence is known: midpoints of steps by the classical Runge-Kutta method. */
 static void harmonic_oscillator_march(const harmonic_oscillator_solver *s, harmonic_oscillator_lines line[1])
 {
@@ -596,6 +602,7 @@ static void harmonic_oscillator_march(const harmonic_oscillator_solver *s, harmo
 static int harmonic_oscillator_block(harmonic_oscillator_solver *s, harmonic_oscillator_table *table, int most)
 {
     harmonic_oscillator_lines line[1];
+    harmonic_oscillator_lanes sizes;
     double x[2], carry[2], value[2], previous = HUGE_VAL;
     int passes = 0, solved = 0;
     if (!s->foreseeing) harmonic_oscillator_march(s, line);
@@ -607,7 +614,10 @@ static int harmonic_oscillator_block(harmonic_oscillator_solver *s, harmonic_osc
         memcpy(x, s->x, sizeof x);
         memcpy(carry, s->carry, sizeof carry);
         harmonic_oscillator_chain(line, x, carry);
-        for (int stage = 0; stage < 1; ++stage) size = fmax(size, harmonic_oscillator_correct(&line[stage]));
+        for (int stage = 0; stage < 1; ++stage) {
+            harmonic_oscillator_correct(&line[stage], sizes);
+            size = fmax(size, harmonic_oscillator_largest(sizes));
+        }
         s->evaluations += 1 * harmonic_oscillator_LANES;
         const double growth = size / (previous * previous);
         /* The second test: after the square of so small a correction there is rounding only. */
@@ -632,7 +642,8 @@ static int harmonic_oscillator_block(harmonic_oscillator_solver *s, harmonic_osc
     return passes;
 }
 
-/* How the next block is guessed: by recurrences once they are fitted, which takes a thousand steps to repay. */
+/* How the next block is guessed: by recurrences, fitted as soon as enough steps are to be made, or
+   have been, to repay that. */
 static void harmonic_oscillator_choose_guess(harmonic_oscillator_solver *s, size_t steps)
 {
     for (int stage = 0; stage < 1; ++stage)
@@ -640,7 +651,7 @@ static void harmonic_oscillator_choose_guess(harmonic_oscillator_solver *s, size
             s->foreseeing = 0;
             return;
         }
-    if (s->foreseeing || steps < 1000 || s->steps < s->retry) return;
+    if (s->foreseeing || (steps < 4000 && s->steps < 4000) || s->steps < s->retry) return;
     for (int stage = 0; stage < 1; ++stage) harmonic_oscillator_fit(&s->memory[stage]);
     s->foreseeing = 1;
     s->pause = harmonic_oscillator_LANES;
@@ -652,7 +663,7 @@ static void harmonic_oscillator_learn_from(harmonic_oscillator_solver *s, int pa
 {
     if (s->foreseeing && (passes == 0 || (passes > 1 && passes >= s->passes))) {
         s->foreseeing = 0;
-        s->doubt = 2 * s->doubt + 2000;
+        s->doubt = 2 * s->doubt + 4000;
         s->retry = s->steps + s->doubt;
     } else if (passes == 0) {
         s->setback = 2 * s->setback + harmonic_oscillator_LANES > 1000 ? 1000 : 2 * s->setback + harmonic_oscillator_LANES;
@@ -695,23 +706,289 @@ harmonic_oscillator_status harmonic_oscillator_integrate(harmonic_oscillator_sol
     return status;
 }
 
+/* Members of an ensemble, each in its lane. */
+typedef struct {
+    harmonic_oscillator_lanes x[2], carry[2], coef[1][5];
+    harmonic_oscillator_lanes past[1][96][2]; /* solved values, in a ring */
+    harmonic_oscillator_lanes weight[1][32][2]; /* of past values, the latest first, for the next */
+    int latest;     /* the row of the latest values */
+    int count;      /* rows in use */
+    int order[1];   /* how many of them the extrapolation uses */
+    int fits;       /* how often recurrences have been fitted */
+    int fitting[1]; /* whether they are the better guess */
+    int slow;       /* how many of the last steps took more than one iteration */
+    int patience;   /* how many of those before recurrences are fitted again */
+    int active[8];  /* whether the lane has a member that has not failed */
+    size_t left[8]; /* steps that it has still to make */
+} harmonic_oscillator_group;
+
+/* The past values of a stage, the latest for k = 0. */
+static harmonic_oscillator_lanes *harmonic_oscillator_group_past(harmonic_oscillator_group *group, int stage, int k)
+{
+    return group->past[stage][(group->latest + k) % 96];
+}
+
+/* Guess the values of a stage by the recurrences of the members. */
+static void harmonic_oscillator_group_foresee(harmonic_oscillator_group *group, int stage, harmonic_oscillator_lanes y[restrict 2])
+{
+    memset(y, 0, 2 * sizeof y[0]);
+    for (int k = 0; k < 32; ++k) {
+        harmonic_oscillator_lanes *past = harmonic_oscillator_group_past(group, stage, k), *weight = group->weight[stage][k];
+        for (int i = 0; i < 2; ++i) {
+            harmonic_oscillator_EACH_LANE
+            for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane) y[i][lane] += weight[i][lane] * past[i][lane];
+        }
+    }
+}
+
+/* Extrapolate the values of a stage. */
+static void harmonic_oscillator_group_extrapolate(harmonic_oscillator_group *group, int stage, harmonic_oscillator_lanes y[restrict 2])
+{
+    const int order = group->order[stage];
+    double binomial = -1.0;
+    memcpy(y, group->x, 2 * sizeof y[0]);
+    if (order > 0) memset(y, 0, 2 * sizeof y[0]);
+    for (int k = 0; k < order; ++k) {
+        harmonic_oscillator_lanes *past = harmonic_oscillator_group_past(group, stage, k);
+        binomial *= -(double)(order - k) / (k + 1);
+        for (int i = 0; i < 2; ++i) {
+            harmonic_oscillator_EACH_LANE
+            for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane) y[i][lane] += binomial * past[i][lane];
+        }
+    }
+}
+
+/* The sum over members of the absolute values of all components. */
+static double harmonic_oscillator_group_sum(const harmonic_oscillator_group *group, harmonic_oscillator_lanes y[2])
+{
+    double sum = 0.0;
+    for (int i = 0; i < 2; ++i)
+        for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane) sum += group->active[lane] ? fabs(y[i][lane]) : 0.0;
+    return sum;
+}
+
+static void harmonic_oscillator_group_subtract(harmonic_oscillator_lanes y[restrict 2], harmonic_oscillator_lanes other[restrict 2])
+{
+    for (int i = 0; i < 2; ++i) {
+        harmonic_oscillator_EACH_LANE
+        for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane) y[i][lane] -= other[i][lane];
+    }
+}
+
+/* Choose the guess that would have been best for these values. */
+static void harmonic_oscillator_group_judge(harmonic_oscillator_group *group, int stage, harmonic_oscillator_lanes y[2])
+{
+    harmonic_oscillator_lanes row[8 + 1][2];
+    const int rows = group->count < 8 ? group->count : 8;
+    double least = HUGE_VAL;
+    memcpy(row[0], y, sizeof row[0]);
+    for (int k = 0; k < rows; ++k) memcpy(row[k + 1], harmonic_oscillator_group_past(group, stage, k), sizeof row[0]);
+    if (group->order[stage] == 0) group->order[stage] = 1;
+    for (int order = 1; order <= rows; ++order) { /* row[0] becomes the backward difference of this order */
+        for (int k = 0; k <= rows - order; ++k) harmonic_oscillator_group_subtract(row[k], row[k + 1]);
+        const double size = harmonic_oscillator_group_sum(group, row[0]);
+        if (size < least) {
+            least = size;
+            group->order[stage] = order;
+        }
+    }
+    if (group->fits == 0) return;
+    harmonic_oscillator_group_foresee(group, stage, row[0]);
+    harmonic_oscillator_group_subtract(row[0], y);
+    group->fitting[stage] = harmonic_oscillator_group_sum(group, row[0]) <= least;
+}
+
+/* Fit the recurrences of all members; with every time, wait longer before it is done again. */
+static void harmonic_oscillator_group_fit(harmonic_oscillator_group *group)
+{
+    harmonic_oscillator_memory memory;
+    memory.count = 96;
+    for (int stage = 0; stage < 1; ++stage)
+        for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane) {
+            for (int i = 0; i < 2; ++i) {
+                for (int k = 0; k < 96; ++k)
+                    memory.past[96 - 1 - k][i] = harmonic_oscillator_group_past(group, stage, k)[i][lane];
+                if (group->active[lane]) harmonic_oscillator_train(&memory, i);
+                for (int k = 0; k < 32 && group->active[lane]; ++k)
+                    group->weight[stage][k][i][lane] = memory.weight[k][i][0];
+            }
+            group->fitting[stage] = 1;
+        }
+    ++group->fits;
+    group->slow = 0;
+    group->patience = group->patience < 10000 ? 2 * group->patience + 1000 : 20000;
+}
+
+/* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group. */
+static int harmonic_oscillator_group_open(harmonic_oscillator_group *group, const harmonic_oscillator_lanes size, const harmonic_oscillator_lanes previous)
+{
+    int open = 0;
+    for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane) {
+        const double growth = size[lane] / (previous[lane] * previous[lane]);
+        const double remaining = size[lane] * size[lane] * (growth > 1.0 ? growth : 1.0);
+        const int solved = remaining <= 1e-20 || (previous[lane] < 1e-8 && size[lane] < 1e-10);
+        if (!isfinite(size[lane])) group->active[lane] = 0;
+        open += group->active[lane] && !solved;
+    }
+    return open;
+}
+
+/* Newton's method for a stage, until the slowest lane is solved. The number of iterations; where that is the most
+   allowed, lanes that are not solved leave the group. */
+static int harmonic_oscillator_group_solve(harmonic_oscillator_group *group, int stage, harmonic_oscillator_lines *line)
+{
+    harmonic_oscillator_lanes size, previous;
+    int iterations = 0, open = 1;
+    for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane) size[lane] = HUGE_VAL;
+    if (group->fitting[stage]) harmonic_oscillator_group_foresee(group, stage, line->y);
+    else harmonic_oscillator_group_extrapolate(group, stage, line->y);
+    for (; open > 0 && iterations < 20; ++iterations) {
+        memcpy(previous, size, sizeof size);
+        harmonic_oscillator_tabulate(group->coef[stage], line);
+        for (int i = 0; i < 2; ++i) {
+            harmonic_oscillator_EACH_LANE
+            for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane)
+                line->residual[i][lane] =
+                    ((line->y[i][lane] - group->x[i][lane]) + line->displacement[i][lane]) - group->carry[i][lane];
+        }
+        harmonic_oscillator_correct(line, size);
+        open = harmonic_oscillator_group_open(group, size, previous);
+    }
+    for (int lane = 0; lane < harmonic_oscillator_LANES && open > 0; ++lane)
+        group->active[lane] = group->active[lane] && size[lane] * size[lane] <= 1e-20;
+    return iterations;
+}
+
+/* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
+static void harmonic_oscillator_group_advance(harmonic_oscillator_lanes x[restrict 2], harmonic_oscillator_lanes carry[restrict 2],
+    harmonic_oscillator_lines *line)
+{
+    for (int i = 0; i < 2; ++i)
+        for (int j = 0; j < 2; ++j) {
+            harmonic_oscillator_EACH_LANE
+            for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane)
+                carry[i][lane] -= line->gain[i * 2 + j][lane] * line->residual[j][lane];
+        }
+    for (int i = 0; i < 2; ++i) {
+        harmonic_oscillator_EACH_LANE
+        for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane) {
+            const double change = line->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
+            const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
+            x[i][lane] = sum + small;
+            carry[i][lane] = small - (x[i][lane] - sum);
+        }
+    }
+}
+
+/* One step of all members. One that fails keeps its state, and leaves. How many are left. */
+static int harmonic_oscillator_group_step(harmonic_oscillator_group *group)
+{
+    harmonic_oscillator_lanes x[2], carry[2];
+    harmonic_oscillator_lines line;
+    const int next = (group->latest + 96 - 1) % 96;
+    int active = 0, most = 0;
+    memcpy(x, group->x, sizeof x);
+    memcpy(carry, group->carry, sizeof carry);
+    for (int stage = 0; stage < 1; ++stage) {
+        const int iterations = harmonic_oscillator_group_solve(group, stage, &line);
+        harmonic_oscillator_group_advance(group->x, group->carry, &line);
+        if (next % 8 == 0 || group->count < 8) harmonic_oscillator_group_judge(group, stage, line.y);
+        if (iterations > most) most = iterations;
+        memcpy(group->past[stage][next], line.y, sizeof line.y);
+    }
+    group->latest = next;
+    if (group->count < 96) ++group->count;
+    group->slow = most > 1 ? group->slow + 1 : 0;
+    if (group->slow > group->patience && group->count == 96) harmonic_oscillator_group_fit(group);
+    for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane) {
+        for (int i = 0; i < 2; ++i)
+            if (!isfinite(group->x[i][lane])) group->active[lane] = 0;
+        for (int i = 0; i < 2 && !group->active[lane]; ++i) {
+            group->x[i][lane] = x[i][lane];
+            group->carry[i][lane] = carry[i][lane];
+        }
+        group->left[lane] -= group->active[lane] != 0;
+        active += group->active[lane] != 0;
+    }
+    return active;
+}
+
+/* Put a member into a lane: its state, and its coefficients. */
+static harmonic_oscillator_status harmonic_oscillator_group_join(harmonic_oscillator_group *group, int lane, const harmonic_oscillator_params *params,
+    const double x0[2], double h)
+{
+    harmonic_oscillator_solver s;
+    harmonic_oscillator_status status = harmonic_oscillator_init(&s, params, x0);
+    if (status == harmonic_oscillator_OK) status = harmonic_oscillator_set_step(&s, h);
+    if (status != harmonic_oscillator_OK) return status;
+    for (int i = 0; i < 2; ++i) group->x[i][lane] = s.x[i];
+    for (int stage = 0; stage < 1; ++stage)
+        for (int k = 0; k < 5; ++k) group->coef[stage][k][lane] = s.coef[stage][k];
+    group->active[lane] = 1;
+    return status;
+}
+
+/* The steps that a member has still to make after it left the group, by itself. */
+static harmonic_oscillator_status harmonic_oscillator_group_finish(const harmonic_oscillator_group *group, int lane, const harmonic_oscillator_params *params,
+    double x[2], double h)
+{
+    harmonic_oscillator_solver s;
+    harmonic_oscillator_status status = harmonic_oscillator_init(&s, params, x);
+    if (status != harmonic_oscillator_OK) return status;
+    for (int i = 0; i < 2; ++i) s.carry[i] = group->carry[i][lane];
+    status = harmonic_oscillator_integrate(&s, h, group->left[lane]);
+    memcpy(x, s.x, sizeof s.x);
+    return status;
+}
+
+/* The members from first on, as many as there are lanes. The first status that is not OK. */
+static harmonic_oscillator_status harmonic_oscillator_group_run(const harmonic_oscillator_params *params, double *x, size_t members, size_t first,
+    double h, size_t steps, unsigned char *status)
+{
+    harmonic_oscillator_group group;
+    harmonic_oscillator_status worst = harmonic_oscillator_OK, member[8];
+    const int count = members - first < harmonic_oscillator_LANES ? (int)(members - first) : harmonic_oscillator_LANES;
+    double state[2];
+    memset(&group, 0, sizeof group);
+    group.patience = 1000;
+    for (int lane = 0; lane < count; ++lane) {
+        for (size_t i = 0; i < 2; ++i) state[i] = x[i * members + first + (size_t)lane];
+        group.left[lane] = steps;
+        member[lane] = harmonic_oscillator_group_join(&group, lane, params, state, h);
+    }
+    for (size_t k = 0; k < steps && harmonic_oscillator_group_step(&group) > 2; ++k) continue;
+    for (int lane = 0; lane < count; ++lane) {
+        for (int i = 0; i < 2; ++i) state[i] = group.x[i][lane];
+        if (member[lane] == harmonic_oscillator_OK) {
+            if (group.left[lane] > 0) member[lane] = harmonic_oscillator_group_finish(&group, lane, params, state, h);
+            for (size_t i = 0; i < 2; ++i) x[i * members + first + (size_t)lane] = state[i];
+        }
+        if (status != NULL) status[first + (size_t)lane] = (unsigned char)member[lane];
+        if (worst == harmonic_oscillator_OK) worst = member[lane];
+    }
+    return worst;
+}
+
 harmonic_oscillator_status harmonic_oscillator_ensemble(const harmonic_oscillator_params *params, double *x,
                                                         size_t members, double h, size_t steps,
                                                         unsigned char *status)
 {
     harmonic_oscillator_status worst = harmonic_oscillator_OK;
+    size_t earliest = members;
     if (x == NULL && members > 0) return harmonic_oscillator_BAD_ARGUMENT;
-    for (size_t m = 0; m < members; ++m) {
-        harmonic_oscillator_solver s;
-        double x0[2];
-        for (size_t i = 0; i < 2; ++i) x0[i] = x[i * members + m];
-        harmonic_oscillator_status member = harmonic_oscillator_init(&s, params, x0);
-        if (member == harmonic_oscillator_OK) {
-            member = harmonic_oscillator_integrate(&s, h, steps);
-            for (size_t i = 0; i < 2; ++i) x[i * members + m] = s.x[i];
+#ifdef _OPENMP
+#pragma omp parallel for schedule(dynamic)
+#endif
+    for (size_t first = 0; first < members; first += harmonic_oscillator_LANES) {
+        const harmonic_oscillator_status group = harmonic_oscillator_group_run(params, x, members, first, h, steps, status);
+        if (group == harmonic_oscillator_OK) continue;
+#ifdef _OPENMP
+#pragma omp critical
+#endif
+        if (first < earliest) {
+            earliest = first;
+            worst = group;
         }
-        if (status != NULL) status[m] = (unsigned char)member;
-        if (worst == harmonic_oscillator_OK) worst = member;
     }
     return worst;
 }

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: c5047e000d54f1dfdc52563158bbd70a32c99c04d1020a5193f657d4ecbe04ed
+ * body-sha256: e6abf9e2344e16a41339e597b88a5f765971ebd0bb6ce554e2d4bba98e8974e9
  */
 #ifndef HARMONIC_OSCILLATOR_H
 #define HARMONIC_OSCILLATOR_H
@@ -90,7 +90,8 @@ harmonic_oscillator_status harmonic_oscillator_step(harmonic_oscillator_solver *
 /* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 harmonic_oscillator_status harmonic_oscillator_integrate(harmonic_oscillator_solver *s, double h, size_t steps);
 
-/* Many members, each integrated by itself, in place: x[i * members + m] is coordinate i of member m.
+/* Many members, in place: x[i * members + m] is coordinate i of member m. 8 are integrated
+   side by side, and with OpenMP such groups in parallel.
    status (or NULL) receives the status of each member; a failed member keeps its last good state.
    Returns the first status that is not OK. */
 harmonic_oscillator_status harmonic_oscillator_ensemble(const harmonic_oscillator_params *params, double *x,

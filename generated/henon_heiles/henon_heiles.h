@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 72493d8b33230922042a6481e2de53269488644216f3fc8b03ac694189729c29
+ * body-sha256: 4351986fc29016ed0b5cfbc3edf60105aa11d69639ecac7c27866659f09e4f0a
  */
 #ifndef HENON_HEILES_H
 #define HENON_HEILES_H
@@ -88,7 +88,8 @@ henon_heiles_status henon_heiles_step(henon_heiles_solver *s, double h);
 /* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 henon_heiles_status henon_heiles_integrate(henon_heiles_solver *s, double h, size_t steps);
 
-/* Many members, each integrated by itself, in place: x[i * members + m] is coordinate i of member m.
+/* Many members, in place: x[i * members + m] is coordinate i of member m. 8 are integrated
+   side by side, and with OpenMP such groups in parallel.
    status (or NULL) receives the status of each member; a failed member keeps its last good state.
    Returns the first status that is not OK. */
 henon_heiles_status henon_heiles_ensemble(const henon_heiles_params *params, double *x, size_t members,

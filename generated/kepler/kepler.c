@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 398d708bb9be1c1504e80654c869d0ee9e2e265ed7f4bc2e6e59cd191af26fef
+ * body-sha256: 95f549c099e7929c3dc2ab9bb022a0fb24b44c37801854cff17ac00abac9f251
  */
 #include "kepler.h"
 
@@ -636,7 +636,7 @@ static void kepler_fit(kepler_memory *memory)
     memory->fitting = 1;
     ++memory->fits;
     memory->slow = 0;
-    memory->patience = memory->patience < 10000 ? 2 * memory->patience + 96 : 20000;
+    memory->patience = memory->patience < 10000 ? 2 * memory->patience + 1000 : 20000;
 }
 
 /* Take in the solved value: what took one iteration needs no better guess. */
@@ -758,6 +758,7 @@ static kepler_status kepler_set_step(kepler_solver *s, double h)
     for (int stage = 0; stage < 1; ++stage)
         kepler_prepare(&s->params, kepler_fractions[stage] * h, s->coef[stage]);
     memset(s->memory, 0, sizeof s->memory);
+    for (int stage = 0; stage < 1; ++stage) s->memory[stage].patience = 1000;
     s->pause = 16;
     s->setback = s->foreseeing = 0;
     s->doubt = s->retry = 0;
@@ -1176,6 +1177,33 @@ static void kepler_sizes(kepler_lanes y[restrict 4], kepler_lanes delta[restrict
     }
 }
 
+/* Correct y by the residuals, with the inverse in the table, and measure the corrections. */
+static void kepler_correct(kepler_lines *line, kepler_lanes size)
+{
+    kepler_lanes delta[4];
+    memset(delta, 0, sizeof delta);
+    for (int i = 0; i < 4; ++i)
+        for (int j = 0; j < 4; ++j) {
+            kepler_EACH_LANE
+            for (int lane = 0; lane < kepler_LANES; ++lane)
+                delta[i][lane] += line->inverse[i * 4 + j][lane] * line->residual[j][lane];
+        }
+    kepler_sizes(line->y, delta, size);
+    for (int i = 0; i < 4; ++i)
+        for (int lane = 0; lane < kepler_LANES; ++lane) line->y[i][lane] -= delta[i][lane];
+}
+
+/* The largest size; infinite if one is not finite. */
+static double kepler_largest(const kepler_lanes size)
+{
+    double largest = 0.0, total = 0.0;
+    for (int lane = 0; lane < kepler_LANES; ++lane) {
+        total += size[lane];
+        largest = size[lane] > largest ? size[lane] : largest;
+    }
+    return isfinite(total) ? largest : HUGE_VAL;
+}
+
 /* The steps of a block one after the other, each along the lines of its lane. As X, the state with its carry, gains
    increment - gain residual, the next residual follows from this one; X itself is added up apart. */
 static void kepler_chain(kepler_lines line[1], double x[4], double carry[4])
@@ -1238,28 +1266,6 @@ static void kepler_foresee(const kepler_memory *memory, kepler_lanes weight[rest
     }
 }
 
-/* Correct y by the residuals that the chain found. The largest size of a correction; infinite if one is not finite. */
-static double kepler_correct(kepler_lines *line)
-{
-    kepler_lanes size, delta[4];
-    double largest = 0.0, total = 0.0;
-    memset(delta, 0, sizeof delta);
-    for (int i = 0; i < 4; ++i)
-        for (int j = 0; j < 4; ++j) {
-            kepler_EACH_LANE
-            for (int lane = 0; lane < kepler_LANES; ++lane)
-                delta[i][lane] += line->inverse[i * 4 + j][lane] * line->residual[j][lane];
-        }
-    kepler_sizes(line->y, delta, size);
-    for (int i = 0; i < 4; ++i)
-        for (int lane = 0; lane < kepler_LANES; ++lane) line->y[i][lane] -= delta[i][lane];
-    for (int lane = 0; lane < kepler_LANES; ++lane) {
-        total += size[lane];
-        largest = size[lane] > largest ? size[lane] : largest;
-    }
-    return isfinite(total) ? largest : HUGE_VAL;
-}
-
 /* Guesses where no recurrence is known: midpoints of steps by the classical Runge-Kutta method. */
 static void kepler_march(const kepler_solver *s, kepler_lines line[1])
 {
@@ -1289,6 +1295,7 @@ static void kepler_march(const kepler_solver *s, kepler_lines line[1])
 static int kepler_block(kepler_solver *s, kepler_table *table, int most)
 {
     kepler_lines line[1];
+    kepler_lanes sizes;
     double x[4], carry[4], value[4], previous = HUGE_VAL;
     int passes = 0, solved = 0;
     if (!s->foreseeing) kepler_march(s, line);
@@ -1300,7 +1307,10 @@ static int kepler_block(kepler_solver *s, kepler_table *table, int most)
         memcpy(x, s->x, sizeof x);
         memcpy(carry, s->carry, sizeof carry);
         kepler_chain(line, x, carry);
-        for (int stage = 0; stage < 1; ++stage) size = fmax(size, kepler_correct(&line[stage]));
+        for (int stage = 0; stage < 1; ++stage) {
+            kepler_correct(&line[stage], sizes);
+            size = fmax(size, kepler_largest(sizes));
+        }
         s->evaluations += 1 * kepler_LANES;
         const double growth = size / (previous * previous);
         /* The second test: after the square of so small a correction there is rounding only. */
@@ -1325,7 +1335,8 @@ static int kepler_block(kepler_solver *s, kepler_table *table, int most)
     return passes;
 }
 
-/* How the next block is guessed: by recurrences once they are fitted, which takes a thousand steps to repay. */
+/* How the next block is guessed: by recurrences, fitted as soon as enough steps are to be made, or
+   have been, to repay that. */
 static void kepler_choose_guess(kepler_solver *s, size_t steps)
 {
     for (int stage = 0; stage < 1; ++stage)
@@ -1333,7 +1344,7 @@ static void kepler_choose_guess(kepler_solver *s, size_t steps)
             s->foreseeing = 0;
             return;
         }
-    if (s->foreseeing || steps < 1000 || s->steps < s->retry) return;
+    if (s->foreseeing || (steps < 4000 && s->steps < 4000) || s->steps < s->retry) return;
     for (int stage = 0; stage < 1; ++stage) kepler_fit(&s->memory[stage]);
     s->foreseeing = 1;
     s->pause = kepler_LANES;
@@ -1345,7 +1356,7 @@ static void kepler_learn_from(kepler_solver *s, int passes)
 {
     if (s->foreseeing && (passes == 0 || (passes > 1 && passes >= s->passes))) {
         s->foreseeing = 0;
-        s->doubt = 2 * s->doubt + 2000;
+        s->doubt = 2 * s->doubt + 4000;
         s->retry = s->steps + s->doubt;
     } else if (passes == 0) {
         s->setback = 2 * s->setback + kepler_LANES > 1000 ? 1000 : 2 * s->setback + kepler_LANES;
@@ -1388,22 +1399,288 @@ kepler_status kepler_integrate(kepler_solver *s, double h, size_t steps)
     return status;
 }
 
+/* Members of an ensemble, each in its lane. */
+typedef struct {
+    kepler_lanes x[4], carry[4], coef[1][118];
+    kepler_lanes past[1][96][4]; /* solved values, in a ring */
+    kepler_lanes weight[1][32][4]; /* of past values, the latest first, for the next */
+    int latest;     /* the row of the latest values */
+    int count;      /* rows in use */
+    int order[1];   /* how many of them the extrapolation uses */
+    int fits;       /* how often recurrences have been fitted */
+    int fitting[1]; /* whether they are the better guess */
+    int slow;       /* how many of the last steps took more than one iteration */
+    int patience;   /* how many of those before recurrences are fitted again */
+    int active[8];  /* whether the lane has a member that has not failed */
+    size_t left[8]; /* steps that it has still to make */
+} kepler_group;
+
+/* The past values of a stage, the latest for k = 0. */
+static kepler_lanes *kepler_group_past(kepler_group *group, int stage, int k)
+{
+    return group->past[stage][(group->latest + k) % 96];
+}
+
+/* Guess the values of a stage by the recurrences of the members. */
+static void kepler_group_foresee(kepler_group *group, int stage, kepler_lanes y[restrict 4])
+{
+    memset(y, 0, 4 * sizeof y[0]);
+    for (int k = 0; k < 32; ++k) {
+        kepler_lanes *past = kepler_group_past(group, stage, k), *weight = group->weight[stage][k];
+        for (int i = 0; i < 4; ++i) {
+            kepler_EACH_LANE
+            for (int lane = 0; lane < kepler_LANES; ++lane) y[i][lane] += weight[i][lane] * past[i][lane];
+        }
+    }
+}
+
+/* Extrapolate the values of a stage. */
+static void kepler_group_extrapolate(kepler_group *group, int stage, kepler_lanes y[restrict 4])
+{
+    const int order = group->order[stage];
+    double binomial = -1.0;
+    memcpy(y, group->x, 4 * sizeof y[0]);
+    if (order > 0) memset(y, 0, 4 * sizeof y[0]);
+    for (int k = 0; k < order; ++k) {
+        kepler_lanes *past = kepler_group_past(group, stage, k);
+        binomial *= -(double)(order - k) / (k + 1);
+        for (int i = 0; i < 4; ++i) {
+            kepler_EACH_LANE
+            for (int lane = 0; lane < kepler_LANES; ++lane) y[i][lane] += binomial * past[i][lane];
+        }
+    }
+}
+
+/* The sum over members of the absolute values of all components. */
+static double kepler_group_sum(const kepler_group *group, kepler_lanes y[4])
+{
+    double sum = 0.0;
+    for (int i = 0; i < 4; ++i)
+        for (int lane = 0; lane < kepler_LANES; ++lane) sum += group->active[lane] ? fabs(y[i][lane]) : 0.0;
+    return sum;
+}
+
+static void kepler_group_subtract(kepler_lanes y[restrict 4], kepler_lanes other[restrict 4])
+{
+    for (int i = 0; i < 4; ++i) {
+        kepler_EACH_LANE
+        for (int lane = 0; lane < kepler_LANES; ++lane) y[i][lane] -= other[i][lane];
+    }
+}
+
+/* Choose the guess that would have been best for these values. */
+static void kepler_group_judge(kepler_group *group, int stage, kepler_lanes y[4])
+{
+    kepler_lanes row[8 + 1][4];
+    const int rows = group->count < 8 ? group->count : 8;
+    double least = HUGE_VAL;
+    memcpy(row[0], y, sizeof row[0]);
+    for (int k = 0; k < rows; ++k) memcpy(row[k + 1], kepler_group_past(group, stage, k), sizeof row[0]);
+    if (group->order[stage] == 0) group->order[stage] = 1;
+    for (int order = 1; order <= rows; ++order) { /* row[0] becomes the backward difference of this order */
+        for (int k = 0; k <= rows - order; ++k) kepler_group_subtract(row[k], row[k + 1]);
+        const double size = kepler_group_sum(group, row[0]);
+        if (size < least) {
+            least = size;
+            group->order[stage] = order;
+        }
+    }
+    if (group->fits == 0) return;
+    kepler_group_foresee(group, stage, row[0]);
+    kepler_group_subtract(row[0], y);
+    group->fitting[stage] = kepler_group_sum(group, row[0]) <= least;
+}
+
+/* Fit the recurrences of all members; with every time, wait longer before it is done again. */
+static void kepler_group_fit(kepler_group *group)
+{
+    kepler_memory memory;
+    memory.count = 96;
+    for (int stage = 0; stage < 1; ++stage)
+        for (int lane = 0; lane < kepler_LANES; ++lane) {
+            for (int i = 0; i < 4; ++i) {
+                for (int k = 0; k < 96; ++k)
+                    memory.past[96 - 1 - k][i] = kepler_group_past(group, stage, k)[i][lane];
+                if (group->active[lane]) kepler_train(&memory, i);
+                for (int k = 0; k < 32 && group->active[lane]; ++k)
+                    group->weight[stage][k][i][lane] = memory.weight[k][i][0];
+            }
+            group->fitting[stage] = 1;
+        }
+    ++group->fits;
+    group->slow = 0;
+    group->patience = group->patience < 10000 ? 2 * group->patience + 1000 : 20000;
+}
+
+/* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group. */
+static int kepler_group_open(kepler_group *group, const kepler_lanes size, const kepler_lanes previous)
+{
+    int open = 0;
+    for (int lane = 0; lane < kepler_LANES; ++lane) {
+        const double growth = size[lane] / (previous[lane] * previous[lane]);
+        const double remaining = size[lane] * size[lane] * (growth > 1.0 ? growth : 1.0);
+        const int solved = remaining <= 1e-20 || (previous[lane] < 1e-8 && size[lane] < 1e-10);
+        if (!isfinite(size[lane])) group->active[lane] = 0;
+        open += group->active[lane] && !solved;
+    }
+    return open;
+}
+
+/* Newton's method for a stage, until the slowest lane is solved. The number of iterations; where that is the most
+   allowed, lanes that are not solved leave the group. */
+static int kepler_group_solve(kepler_group *group, int stage, kepler_lines *line)
+{
+    kepler_lanes size, previous;
+    int iterations = 0, open = 1;
+    for (int lane = 0; lane < kepler_LANES; ++lane) size[lane] = HUGE_VAL;
+    if (group->fitting[stage]) kepler_group_foresee(group, stage, line->y);
+    else kepler_group_extrapolate(group, stage, line->y);
+    for (; open > 0 && iterations < 20; ++iterations) {
+        memcpy(previous, size, sizeof size);
+        kepler_tabulate(group->coef[stage], line);
+        for (int i = 0; i < 4; ++i) {
+            kepler_EACH_LANE
+            for (int lane = 0; lane < kepler_LANES; ++lane)
+                line->residual[i][lane] =
+                    ((line->y[i][lane] - group->x[i][lane]) + line->displacement[i][lane]) - group->carry[i][lane];
+        }
+        kepler_correct(line, size);
+        open = kepler_group_open(group, size, previous);
+    }
+    for (int lane = 0; lane < kepler_LANES && open > 0; ++lane)
+        group->active[lane] = group->active[lane] && size[lane] * size[lane] <= 1e-20;
+    return iterations;
+}
+
+/* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
+static void kepler_group_advance(kepler_lanes x[restrict 4], kepler_lanes carry[restrict 4],
+    kepler_lines *line)
+{
+    for (int i = 0; i < 4; ++i)
+        for (int j = 0; j < 4; ++j) {
+            kepler_EACH_LANE
+            for (int lane = 0; lane < kepler_LANES; ++lane)
+                carry[i][lane] -= line->gain[i * 4 + j][lane] * line->residual[j][lane];
+        }
+    for (int i = 0; i < 4; ++i) {
+        kepler_EACH_LANE
+        for (int lane = 0; lane < kepler_LANES; ++lane) {
+            const double change = line->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
+            const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
+            x[i][lane] = sum + small;
+            carry[i][lane] = small - (x[i][lane] - sum);
+        }
+    }
+}
+
+/* One step of all members. One that fails keeps its state, and leaves. How many are left. */
+static int kepler_group_step(kepler_group *group)
+{
+    kepler_lanes x[4], carry[4];
+    kepler_lines line;
+    const int next = (group->latest + 96 - 1) % 96;
+    int active = 0, most = 0;
+    memcpy(x, group->x, sizeof x);
+    memcpy(carry, group->carry, sizeof carry);
+    for (int stage = 0; stage < 1; ++stage) {
+        const int iterations = kepler_group_solve(group, stage, &line);
+        kepler_group_advance(group->x, group->carry, &line);
+        if (next % 8 == 0 || group->count < 8) kepler_group_judge(group, stage, line.y);
+        if (iterations > most) most = iterations;
+        memcpy(group->past[stage][next], line.y, sizeof line.y);
+    }
+    group->latest = next;
+    if (group->count < 96) ++group->count;
+    group->slow = most > 1 ? group->slow + 1 : 0;
+    if (group->slow > group->patience && group->count == 96) kepler_group_fit(group);
+    for (int lane = 0; lane < kepler_LANES; ++lane) {
+        for (int i = 0; i < 4; ++i)
+            if (!isfinite(group->x[i][lane])) group->active[lane] = 0;
+        for (int i = 0; i < 4 && !group->active[lane]; ++i) {
+            group->x[i][lane] = x[i][lane];
+            group->carry[i][lane] = carry[i][lane];
+        }
+        group->left[lane] -= group->active[lane] != 0;
+        active += group->active[lane] != 0;
+    }
+    return active;
+}
+
+/* Put a member into a lane: its state, and its coefficients. */
+static kepler_status kepler_group_join(kepler_group *group, int lane, const kepler_params *params,
+    const double x0[4], double h)
+{
+    kepler_solver s;
+    kepler_status status = kepler_init(&s, params, x0);
+    if (status == kepler_OK) status = kepler_set_step(&s, h);
+    if (status != kepler_OK) return status;
+    for (int i = 0; i < 4; ++i) group->x[i][lane] = s.x[i];
+    for (int stage = 0; stage < 1; ++stage)
+        for (int k = 0; k < 118; ++k) group->coef[stage][k][lane] = s.coef[stage][k];
+    group->active[lane] = 1;
+    return status;
+}
+
+/* The steps that a member has still to make after it left the group, by itself. */
+static kepler_status kepler_group_finish(const kepler_group *group, int lane, const kepler_params *params,
+    double x[4], double h)
+{
+    kepler_solver s;
+    kepler_status status = kepler_init(&s, params, x);
+    if (status != kepler_OK) return status;
+    for (int i = 0; i < 4; ++i) s.carry[i] = group->carry[i][lane];
+    status = kepler_integrate(&s, h, group->left[lane]);
+    memcpy(x, s.x, sizeof s.x);
+    return status;
+}
+
+/* The members from first on, as many as there are lanes. The first status that is not OK. */
+static kepler_status kepler_group_run(const kepler_params *params, double *x, size_t members, size_t first,
+    double h, size_t steps, unsigned char *status)
+{
+    kepler_group group;
+    kepler_status worst = kepler_OK, member[8];
+    const int count = members - first < kepler_LANES ? (int)(members - first) : kepler_LANES;
+    double state[4];
+    memset(&group, 0, sizeof group);
+    group.patience = 1000;
+    for (int lane = 0; lane < count; ++lane) {
+        for (size_t i = 0; i < 4; ++i) state[i] = x[i * members + first + (size_t)lane];
+        group.left[lane] = steps;
+        member[lane] = kepler_group_join(&group, lane, params, state, h);
+    }
+    for (size_t k = 0; k < steps && kepler_group_step(&group) > 2; ++k) continue;
+    for (int lane = 0; lane < count; ++lane) {
+        for (int i = 0; i < 4; ++i) state[i] = group.x[i][lane];
+        if (member[lane] == kepler_OK) {
+            if (group.left[lane] > 0) member[lane] = kepler_group_finish(&group, lane, params, state, h);
+            for (size_t i = 0; i < 4; ++i) x[i * members + first + (size_t)lane] = state[i];
+        }
+        if (status != NULL) status[first + (size_t)lane] = (unsigned char)member[lane];
+        if (worst == kepler_OK) worst = member[lane];
+    }
+    return worst;
+}
+
 kepler_status kepler_ensemble(const kepler_params *params, double *x, size_t members, double h, size_t steps,
                               unsigned char *status)
 {
     kepler_status worst = kepler_OK;
+    size_t earliest = members;
     if (x == NULL && members > 0) return kepler_BAD_ARGUMENT;
-    for (size_t m = 0; m < members; ++m) {
-        kepler_solver s;
-        double x0[4];
-        for (size_t i = 0; i < 4; ++i) x0[i] = x[i * members + m];
-        kepler_status member = kepler_init(&s, params, x0);
-        if (member == kepler_OK) {
-            member = kepler_integrate(&s, h, steps);
-            for (size_t i = 0; i < 4; ++i) x[i * members + m] = s.x[i];
+#ifdef _OPENMP
+#pragma omp parallel for schedule(dynamic)
+#endif
+    for (size_t first = 0; first < members; first += kepler_LANES) {
+        const kepler_status group = kepler_group_run(params, x, members, first, h, steps, status);
+        if (group == kepler_OK) continue;
+#ifdef _OPENMP
+#pragma omp critical
+#endif
+        if (first < earliest) {
+            earliest = first;
+            worst = group;
         }
-        if (status != NULL) status[m] = (unsigned char)member;
-        if (worst == kepler_OK) worst = member;
     }
     return worst;
 }

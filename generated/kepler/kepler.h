@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: bb10f0fe631d68e1e57ac5c74e7a6a605cd3ce8c0b0ffcf8c288263124745b7d
+ * body-sha256: 87d9da918aea1119785d85d0c2074fc511b9b9c1195a26fc902b2c4d3f6fee79
  */
 #ifndef KEPLER_H
 #define KEPLER_H
@@ -87,7 +87,8 @@ kepler_status kepler_step(kepler_solver *s, double h);
 /* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 kepler_status kepler_integrate(kepler_solver *s, double h, size_t steps);
 
-/* Many members, each integrated by itself, in place: x[i * members + m] is coordinate i of member m.
+/* Many members, in place: x[i * members + m] is coordinate i of member m. 8 are integrated
+   side by side, and with OpenMP such groups in parallel.
    status (or NULL) receives the status of each member; a failed member keeps its last good state.
    Returns the first status that is not OK. */
 kepler_status kepler_ensemble(const kepler_params *params, double *x, size_t members, double h, size_t steps,

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 02b7f15c4bcdfaf5a6bc28abdf072e6d0f1d943f08e0b9f9932d274fe07257c0
+ * body-sha256: da4e0a6f18c9471ffe795d5477d64489105fddcd57841b0887ab247297361c58
  */
 #include "kowalevski_top.h"
 
@@ -1149,7 +1149,7 @@ static void kowalevski_top_fit(kowalevski_top_memory *memory)
     memory->fitting = 1;
     ++memory->fits;
     memory->slow = 0;
-    memory->patience = memory->patience < 10000 ? 2 * memory->patience + 96 : 20000;
+    memory->patience = memory->patience < 10000 ? 2 * memory->patience + 1000 : 20000;
 }
 
 /* Take in the solved value: what took one iteration needs no better guess. */
@@ -1272,6 +1272,7 @@ static kowalevski_top_status kowalevski_top_set_step(kowalevski_top_solver *s, d
     for (int stage = 0; stage < 1; ++stage)
         kowalevski_top_prepare(&s->params, kowalevski_top_fractions[stage] * h, s->coef[stage]);
     memset(s->memory, 0, sizeof s->memory);
+    for (int stage = 0; stage < 1; ++stage) s->memory[stage].patience = 1000;
     s->pause = 16;
     s->setback = s->foreseeing = 0;
     s->doubt = s->retry = 0;
@@ -2133,6 +2134,33 @@ static void kowalevski_top_sizes(kowalevski_top_lanes y[restrict 6], kowalevski_
     }
 }
 
+/* Correct y by the residuals, with the inverse in the table, and measure the corrections. */
+static void kowalevski_top_correct(kowalevski_top_lines *line, kowalevski_top_lanes size)
+{
+    kowalevski_top_lanes delta[6];
+    memset(delta, 0, sizeof delta);
+    for (int i = 0; i < 6; ++i)
+        for (int j = 0; j < 6; ++j) {
+            kowalevski_top_EACH_LANE
+            for (int lane = 0; lane < kowalevski_top_LANES; ++lane)
+                delta[i][lane] += line->inverse[i * 6 + j][lane] * line->residual[j][lane];
+        }
+    kowalevski_top_sizes(line->y, delta, size);
+    for (int i = 0; i < 6; ++i)
+        for (int lane = 0; lane < kowalevski_top_LANES; ++lane) line->y[i][lane] -= delta[i][lane];
+}
+
+/* The largest size; infinite if one is not finite. */
+static double kowalevski_top_largest(const kowalevski_top_lanes size)
+{
+    double largest = 0.0, total = 0.0;
+    for (int lane = 0; lane < kowalevski_top_LANES; ++lane) {
+        total += size[lane];
+        largest = size[lane] > largest ? size[lane] : largest;
+    }
+    return isfinite(total) ? largest : HUGE_VAL;
+}
+
 /* The steps of a block one after the other, each along the lines of its lane. As X, the state with its carry, gains
    increment - gain residual, the next residual follows from this one; X itself is added up apart. */
 static void kowalevski_top_chain(kowalevski_top_lines line[1], double x[6], double carry[6])
@@ -2195,28 +2223,6 @@ static void kowalevski_top_foresee(const kowalevski_top_memory *memory, kowalevs
     }
 }
 
-/* Correct y by the residuals that the chain found. The largest size of a correction; infinite if one is not finite. */
-static double kowalevski_top_correct(kowalevski_top_lines *line)
-{
-    kowalevski_top_lanes size, delta[6];
-    double largest = 0.0, total = 0.0;
-    memset(delta, 0, sizeof delta);
-    for (int i = 0; i < 6; ++i)
-        for (int j = 0; j < 6; ++j) {
-            kowalevski_top_EACH_LANE
-            for (int lane = 0; lane < kowalevski_top_LANES; ++lane)
-                delta[i][lane] += line->inverse[i * 6 + j][lane] * line->residual[j][lane];
-        }
-    kowalevski_top_sizes(line->y, delta, size);
-    for (int i = 0; i < 6; ++i)
-        for (int lane = 0; lane < kowalevski_top_LANES; ++lane) line->y[i][lane] -= delta[i][lane];
-    for (int lane = 0; lane < kowalevski_top_LANES; ++lane) {
-        total += size[lane];
-        largest = size[lane] > largest ? size[lane] : largest;
-    }
-    return isfinite(total) ? largest : HUGE_VAL;
-}
-
 /* Guesses where no recurrence is known: midpoints of steps by the classical Runge-Kutta method. */
 static void kowalevski_top_march(const kowalevski_top_solver *s, kowalevski_top_lines line[1])
 {
@@ -2246,6 +2252,7 @@ static void kowalevski_top_march(const kowalevski_top_solver *s, kowalevski_top_
 static int kowalevski_top_block(kowalevski_top_solver *s, kowalevski_top_table *table, int most)
 {
     kowalevski_top_lines line[1];
+    kowalevski_top_lanes sizes;
     double x[6], carry[6], value[6], previous = HUGE_VAL;
     int passes = 0, solved = 0;
     if (!s->foreseeing) kowalevski_top_march(s, line);
@@ -2257,7 +2264,10 @@ static int kowalevski_top_block(kowalevski_top_solver *s, kowalevski_top_table *
         memcpy(x, s->x, sizeof x);
         memcpy(carry, s->carry, sizeof carry);
         kowalevski_top_chain(line, x, carry);
-        for (int stage = 0; stage < 1; ++stage) size = fmax(size, kowalevski_top_correct(&line[stage]));
+        for (int stage = 0; stage < 1; ++stage) {
+            kowalevski_top_correct(&line[stage], sizes);
+            size = fmax(size, kowalevski_top_largest(sizes));
+        }
         s->evaluations += 1 * kowalevski_top_LANES;
         const double growth = size / (previous * previous);
         /* The second test: after the square of so small a correction there is rounding only. */
@@ -2282,7 +2292,8 @@ static int kowalevski_top_block(kowalevski_top_solver *s, kowalevski_top_table *
     return passes;
 }
 
-/* How the next block is guessed: by recurrences once they are fitted, which takes a thousand steps to repay. */
+/* How the next block is guessed: by recurrences, fitted as soon as enough steps are to be made, or
+   have been, to repay that. */
 static void kowalevski_top_choose_guess(kowalevski_top_solver *s, size_t steps)
 {
     for (int stage = 0; stage < 1; ++stage)
@@ -2290,7 +2301,7 @@ static void kowalevski_top_choose_guess(kowalevski_top_solver *s, size_t steps)
             s->foreseeing = 0;
             return;
         }
-    if (s->foreseeing || steps < 1000 || s->steps < s->retry) return;
+    if (s->foreseeing || (steps < 4000 && s->steps < 4000) || s->steps < s->retry) return;
     for (int stage = 0; stage < 1; ++stage) kowalevski_top_fit(&s->memory[stage]);
     s->foreseeing = 1;
     s->pause = kowalevski_top_LANES;
@@ -2302,7 +2313,7 @@ static void kowalevski_top_learn_from(kowalevski_top_solver *s, int passes)
 {
     if (s->foreseeing && (passes == 0 || (passes > 1 && passes >= s->passes))) {
         s->foreseeing = 0;
-        s->doubt = 2 * s->doubt + 2000;
+        s->doubt = 2 * s->doubt + 4000;
         s->retry = s->steps + s->doubt;
     } else if (passes == 0) {
         s->setback = 2 * s->setback + kowalevski_top_LANES > 1000 ? 1000 : 2 * s->setback + kowalevski_top_LANES;
@@ -2345,22 +2356,288 @@ kowalevski_top_status kowalevski_top_integrate(kowalevski_top_solver *s, double 
     return status;
 }
 
+/* Members of an ensemble, each in its lane. */
+typedef struct {
+    kowalevski_top_lanes x[6], carry[6], coef[1][172];
+    kowalevski_top_lanes past[1][96][6]; /* solved values, in a ring */
+    kowalevski_top_lanes weight[1][32][6]; /* of past values, the latest first, for the next */
+    int latest;     /* the row of the latest values */
+    int count;      /* rows in use */
+    int order[1];   /* how many of them the extrapolation uses */
+    int fits;       /* how often recurrences have been fitted */
+    int fitting[1]; /* whether they are the better guess */
+    int slow;       /* how many of the last steps took more than one iteration */
+    int patience;   /* how many of those before recurrences are fitted again */
+    int active[8];  /* whether the lane has a member that has not failed */
+    size_t left[8]; /* steps that it has still to make */
+} kowalevski_top_group;
+
+/* The past values of a stage, the latest for k = 0. */
+static kowalevski_top_lanes *kowalevski_top_group_past(kowalevski_top_group *group, int stage, int k)
+{
+    return group->past[stage][(group->latest + k) % 96];
+}
+
+/* Guess the values of a stage by the recurrences of the members. */
+static void kowalevski_top_group_foresee(kowalevski_top_group *group, int stage, kowalevski_top_lanes y[restrict 6])
+{
+    memset(y, 0, 6 * sizeof y[0]);
+    for (int k = 0; k < 32; ++k) {
+        kowalevski_top_lanes *past = kowalevski_top_group_past(group, stage, k), *weight = group->weight[stage][k];
+        for (int i = 0; i < 6; ++i) {
+            kowalevski_top_EACH_LANE
+            for (int lane = 0; lane < kowalevski_top_LANES; ++lane) y[i][lane] += weight[i][lane] * past[i][lane];
+        }
+    }
+}
+
+/* Extrapolate the values of a stage. */
+static void kowalevski_top_group_extrapolate(kowalevski_top_group *group, int stage, kowalevski_top_lanes y[restrict 6])
+{
+    const int order = group->order[stage];
+    double binomial = -1.0;
+    memcpy(y, group->x, 6 * sizeof y[0]);
+    if (order > 0) memset(y, 0, 6 * sizeof y[0]);
+    for (int k = 0; k < order; ++k) {
+        kowalevski_top_lanes *past = kowalevski_top_group_past(group, stage, k);
+        binomial *= -(double)(order - k) / (k + 1);
+        for (int i = 0; i < 6; ++i) {
+            kowalevski_top_EACH_LANE
+            for (int lane = 0; lane < kowalevski_top_LANES; ++lane) y[i][lane] += binomial * past[i][lane];
+        }
+    }
+}
+
+/* The sum over members of the absolute values of all components. */
+static double kowalevski_top_group_sum(const kowalevski_top_group *group, kowalevski_top_lanes y[6])
+{
+    double sum = 0.0;
+    for (int i = 0; i < 6; ++i)
+        for (int lane = 0; lane < kowalevski_top_LANES; ++lane) sum += group->active[lane] ? fabs(y[i][lane]) : 0.0;
+    return sum;
+}
+
+static void kowalevski_top_group_subtract(kowalevski_top_lanes y[restrict 6], kowalevski_top_lanes other[restrict 6])
+{
+    for (int i = 0; i < 6; ++i) {
+        kowalevski_top_EACH_LANE
+        for (int lane = 0; lane < kowalevski_top_LANES; ++lane) y[i][lane] -= other[i][lane];
+    }
+}
+
+/* Choose the guess that would have been best for these values. */
+static void kowalevski_top_group_judge(kowalevski_top_group *group, int stage, kowalevski_top_lanes y[6])
+{
+    kowalevski_top_lanes row[8 + 1][6];
+    const int rows = group->count < 8 ? group->count : 8;
+    double least = HUGE_VAL;
+    memcpy(row[0], y, sizeof row[0]);
+    for (int k = 0; k < rows; ++k) memcpy(row[k + 1], kowalevski_top_group_past(group, stage, k), sizeof row[0]);
+    if (group->order[stage] == 0) group->order[stage] = 1;
+    for (int order = 1; order <= rows; ++order) { /* row[0] becomes the backward difference of this order */
+        for (int k = 0; k <= rows - order; ++k) kowalevski_top_group_subtract(row[k], row[k + 1]);
+        const double size = kowalevski_top_group_sum(group, row[0]);
+        if (size < least) {
+            least = size;
+            group->order[stage] = order;
+        }
+    }
+    if (group->fits == 0) return;
+    kowalevski_top_group_foresee(group, stage, row[0]);
+    kowalevski_top_group_subtract(row[0], y);
+    group->fitting[stage] = kowalevski_top_group_sum(group, row[0]) <= least;
+}
+
+/* Fit the recurrences of all members; with every time, wait longer before it is done again. */
+static void kowalevski_top_group_fit(kowalevski_top_group *group)
+{
+    kowalevski_top_memory memory;
+    memory.count = 96;
+    for (int stage = 0; stage < 1; ++stage)
+        for (int lane = 0; lane < kowalevski_top_LANES; ++lane) {
+            for (int i = 0; i < 6; ++i) {
+                for (int k = 0; k < 96; ++k)
+                    memory.past[96 - 1 - k][i] = kowalevski_top_group_past(group, stage, k)[i][lane];
+                if (group->active[lane]) kowalevski_top_train(&memory, i);
+                for (int k = 0; k < 32 && group->active[lane]; ++k)
+                    group->weight[stage][k][i][lane] = memory.weight[k][i][0];
+            }
+            group->fitting[stage] = 1;
+        }
+    ++group->fits;
+    group->slow = 0;
+    group->patience = group->patience < 10000 ? 2 * group->patience + 1000 : 20000;
+}
+
+/* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group. */
+static int kowalevski_top_group_open(kowalevski_top_group *group, const kowalevski_top_lanes size, const kowalevski_top_lanes previous)
+{
+    int open = 0;
+    for (int lane = 0; lane < kowalevski_top_LANES; ++lane) {
+        const double growth = size[lane] / (previous[lane] * previous[lane]);
+        const double remaining = size[lane] * size[lane] * (growth > 1.0 ? growth : 1.0);
+        const int solved = remaining <= 1e-20 || (previous[lane] < 1e-8 && size[lane] < 1e-10);
+        if (!isfinite(size[lane])) group->active[lane] = 0;
+        open += group->active[lane] && !solved;
+    }
+    return open;
+}
+
+/* Newton's method for a stage, until the slowest lane is solved. The number of iterations; where that is the most
+   allowed, lanes that are not solved leave the group. */
+static int kowalevski_top_group_solve(kowalevski_top_group *group, int stage, kowalevski_top_lines *line)
+{
+    kowalevski_top_lanes size, previous;
+    int iterations = 0, open = 1;
+    for (int lane = 0; lane < kowalevski_top_LANES; ++lane) size[lane] = HUGE_VAL;
+    if (group->fitting[stage]) kowalevski_top_group_foresee(group, stage, line->y);
+    else kowalevski_top_group_extrapolate(group, stage, line->y);
+    for (; open > 0 && iterations < 20; ++iterations) {
+        memcpy(previous, size, sizeof size);
+        kowalevski_top_tabulate(group->coef[stage], line);
+        for (int i = 0; i < 6; ++i) {
+            kowalevski_top_EACH_LANE
+            for (int lane = 0; lane < kowalevski_top_LANES; ++lane)
+                line->residual[i][lane] =
+                    ((line->y[i][lane] - group->x[i][lane]) + line->displacement[i][lane]) - group->carry[i][lane];
+        }
+        kowalevski_top_correct(line, size);
+        open = kowalevski_top_group_open(group, size, previous);
+    }
+    for (int lane = 0; lane < kowalevski_top_LANES && open > 0; ++lane)
+        group->active[lane] = group->active[lane] && size[lane] * size[lane] <= 1e-20;
+    return iterations;
+}
+
+/* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
+static void kowalevski_top_group_advance(kowalevski_top_lanes x[restrict 6], kowalevski_top_lanes carry[restrict 6],
+    kowalevski_top_lines *line)
+{
+    for (int i = 0; i < 6; ++i)
+        for (int j = 0; j < 6; ++j) {
+            kowalevski_top_EACH_LANE
+            for (int lane = 0; lane < kowalevski_top_LANES; ++lane)
+                carry[i][lane] -= line->gain[i * 6 + j][lane] * line->residual[j][lane];
+        }
+    for (int i = 0; i < 6; ++i) {
+        kowalevski_top_EACH_LANE
+        for (int lane = 0; lane < kowalevski_top_LANES; ++lane) {
+            const double change = line->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
+            const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
+            x[i][lane] = sum + small;
+            carry[i][lane] = small - (x[i][lane] - sum);
+        }
+    }
+}
+
+/* One step of all members. One that fails keeps its state, and leaves. How many are left. */
+static int kowalevski_top_group_step(kowalevski_top_group *group)
+{
+    kowalevski_top_lanes x[6], carry[6];
+    kowalevski_top_lines line;
+    const int next = (group->latest + 96 - 1) % 96;
+    int active = 0, most = 0;
+    memcpy(x, group->x, sizeof x);
+    memcpy(carry, group->carry, sizeof carry);
+    for (int stage = 0; stage < 1; ++stage) {
+        const int iterations = kowalevski_top_group_solve(group, stage, &line);
+        kowalevski_top_group_advance(group->x, group->carry, &line);
+        if (next % 8 == 0 || group->count < 8) kowalevski_top_group_judge(group, stage, line.y);
+        if (iterations > most) most = iterations;
+        memcpy(group->past[stage][next], line.y, sizeof line.y);
+    }
+    group->latest = next;
+    if (group->count < 96) ++group->count;
+    group->slow = most > 1 ? group->slow + 1 : 0;
+    if (group->slow > group->patience && group->count == 96) kowalevski_top_group_fit(group);
+    for (int lane = 0; lane < kowalevski_top_LANES; ++lane) {
+        for (int i = 0; i < 6; ++i)
+            if (!isfinite(group->x[i][lane])) group->active[lane] = 0;
+        for (int i = 0; i < 6 && !group->active[lane]; ++i) {
+            group->x[i][lane] = x[i][lane];
+            group->carry[i][lane] = carry[i][lane];
+        }
+        group->left[lane] -= group->active[lane] != 0;
+        active += group->active[lane] != 0;
+    }
+    return active;
+}
+
+/* Put a member into a lane: its state, and its coefficients. */
+static kowalevski_top_status kowalevski_top_group_join(kowalevski_top_group *group, int lane, const kowalevski_top_params *params,
+    const double x0[6], double h)
+{
+    kowalevski_top_solver s;
+    kowalevski_top_status status = kowalevski_top_init(&s, params, x0);
+    if (status == kowalevski_top_OK) status = kowalevski_top_set_step(&s, h);
+    if (status != kowalevski_top_OK) return status;
+    for (int i = 0; i < 6; ++i) group->x[i][lane] = s.x[i];
+    for (int stage = 0; stage < 1; ++stage)
+        for (int k = 0; k < 172; ++k) group->coef[stage][k][lane] = s.coef[stage][k];
+    group->active[lane] = 1;
+    return status;
+}
+
+/* The steps that a member has still to make after it left the group, by itself. */
+static kowalevski_top_status kowalevski_top_group_finish(const kowalevski_top_group *group, int lane, const kowalevski_top_params *params,
+    double x[6], double h)
+{
+    kowalevski_top_solver s;
+    kowalevski_top_status status = kowalevski_top_init(&s, params, x);
+    if (status != kowalevski_top_OK) return status;
+    for (int i = 0; i < 6; ++i) s.carry[i] = group->carry[i][lane];
+    status = kowalevski_top_integrate(&s, h, group->left[lane]);
+    memcpy(x, s.x, sizeof s.x);
+    return status;
+}
+
+/* The members from first on, as many as there are lanes. The first status that is not OK. */
+static kowalevski_top_status kowalevski_top_group_run(const kowalevski_top_params *params, double *x, size_t members, size_t first,
+    double h, size_t steps, unsigned char *status)
+{
+    kowalevski_top_group group;
+    kowalevski_top_status worst = kowalevski_top_OK, member[8];
+    const int count = members - first < kowalevski_top_LANES ? (int)(members - first) : kowalevski_top_LANES;
+    double state[6];
+    memset(&group, 0, sizeof group);
+    group.patience = 1000;
+    for (int lane = 0; lane < count; ++lane) {
+        for (size_t i = 0; i < 6; ++i) state[i] = x[i * members + first + (size_t)lane];
+        group.left[lane] = steps;
+        member[lane] = kowalevski_top_group_join(&group, lane, params, state, h);
+    }
+    for (size_t k = 0; k < steps && kowalevski_top_group_step(&group) > 2; ++k) continue;
+    for (int lane = 0; lane < count; ++lane) {
+        for (int i = 0; i < 6; ++i) state[i] = group.x[i][lane];
+        if (member[lane] == kowalevski_top_OK) {
+            if (group.left[lane] > 0) member[lane] = kowalevski_top_group_finish(&group, lane, params, state, h);
+            for (size_t i = 0; i < 6; ++i) x[i * members + first + (size_t)lane] = state[i];
+        }
+        if (status != NULL) status[first + (size_t)lane] = (unsigned char)member[lane];
+        if (worst == kowalevski_top_OK) worst = member[lane];
+    }
+    return worst;
+}
+
 kowalevski_top_status kowalevski_top_ensemble(const kowalevski_top_params *params, double *x, size_t members,
                                               double h, size_t steps, unsigned char *status)
 {
     kowalevski_top_status worst = kowalevski_top_OK;
+    size_t earliest = members;
     if (x == NULL && members > 0) return kowalevski_top_BAD_ARGUMENT;
-    for (size_t m = 0; m < members; ++m) {
-        kowalevski_top_solver s;
-        double x0[6];
-        for (size_t i = 0; i < 6; ++i) x0[i] = x[i * members + m];
-        kowalevski_top_status member = kowalevski_top_init(&s, params, x0);
-        if (member == kowalevski_top_OK) {
-            member = kowalevski_top_integrate(&s, h, steps);
-            for (size_t i = 0; i < 6; ++i) x[i * members + m] = s.x[i];
+#ifdef _OPENMP
+#pragma omp parallel for schedule(dynamic)
+#endif
+    for (size_t first = 0; first < members; first += kowalevski_top_LANES) {
+        const kowalevski_top_status group = kowalevski_top_group_run(params, x, members, first, h, steps, status);
+        if (group == kowalevski_top_OK) continue;
+#ifdef _OPENMP
+#pragma omp critical
+#endif
+        if (first < earliest) {
+            earliest = first;
+            worst = group;
         }
-        if (status != NULL) status[m] = (unsigned char)member;
-        if (worst == kowalevski_top_OK) worst = member;
     }
     return worst;
 }

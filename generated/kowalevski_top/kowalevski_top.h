@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 1a4dcf7a5914279cefb66b4249571eff4a40a3bc80d8bc0a62cd1e21ae898f66
+ * body-sha256: 85d6ab4585abc2716c1abf3cbfc0a18da23bcfa9bfdd8eab16854a75b6ac8f82
  */
 #ifndef KOWALEVSKI_TOP_H
 #define KOWALEVSKI_TOP_H
@@ -88,7 +88,8 @@ kowalevski_top_status kowalevski_top_step(kowalevski_top_solver *s, double h);
 /* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 kowalevski_top_status kowalevski_top_integrate(kowalevski_top_solver *s, double h, size_t steps);
 
-/* Many members, each integrated by itself, in place: x[i * members + m] is coordinate i of member m.
+/* Many members, in place: x[i * members + m] is coordinate i of member m. 8 are integrated
+   side by side, and with OpenMP such groups in parallel.
    status (or NULL) receives the status of each member; a failed member keeps its last good state.
    Returns the first status that is not OK. */
 kowalevski_top_status kowalevski_top_ensemble(const kowalevski_top_params *params, double *x, size_t members,

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: beafe6a1a7d03d1dd88b7d02ef21584d5fe709620e8d9e3bf003940dd57f5876
+ * body-sha256: c84ace41d9196f0a2a3a08b1f6e26315f62e6966d23c0c1bc94cf74424deeef9
  */
 #ifndef LAGRANGE_TOP_H
 #define LAGRANGE_TOP_H
@@ -90,7 +90,8 @@ lagrange_top_status lagrange_top_step(lagrange_top_solver *s, double h);
 /* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 lagrange_top_status lagrange_top_integrate(lagrange_top_solver *s, double h, size_t steps);
 
-/* Many members, each integrated by itself, in place: x[i * members + m] is coordinate i of member m.
+/* Many members, in place: x[i * members + m] is coordinate i of member m. 8 are integrated
+   side by side, and with OpenMP such groups in parallel.
    status (or NULL) receives the status of each member; a failed member keeps its last good state.
    Returns the first status that is not OK. */
 lagrange_top_status lagrange_top_ensemble(const lagrange_top_params *params, double *x, size_t members,

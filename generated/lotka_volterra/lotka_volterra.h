@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 29e49b0fffcc9d7f4bf12029c1f0279f461d6b63ad61bbbe47cb9ab6ecebdbf1
+ * body-sha256: b7144d11ad8643e31782fba05d805679add7fdb847138f5f611f4fc3159a4832
  */
 #ifndef LOTKA_VOLTERRA_H
 #define LOTKA_VOLTERRA_H
@@ -88,7 +88,8 @@ lotka_volterra_status lotka_volterra_step(lotka_volterra_solver *s, double h);
 /* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 lotka_volterra_status lotka_volterra_integrate(lotka_volterra_solver *s, double h, size_t steps);
 
-/* Many members, each integrated by itself, in place: x[i * members + m] is coordinate i of member m.
+/* Many members, in place: x[i * members + m] is coordinate i of member m. 8 are integrated
+   side by side, and with OpenMP such groups in parallel.
    status (or NULL) receives the status of each member; a failed member keeps its last good state.
    Returns the first status that is not OK. */
 lotka_volterra_status lotka_volterra_ensemble(const lotka_volterra_params *params, double *x, size_t members,

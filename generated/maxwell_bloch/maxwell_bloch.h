@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: a18e1aec95a84a63cc1cd1950a9fc54745b0d262b7ed314fd855689e06ebde58
+ * body-sha256: 8911119f719571552534413301e2af7f6f0897e08c64a83391e729700c784db3
  */
 #ifndef MAXWELL_BLOCH_H
 #define MAXWELL_BLOCH_H
@@ -88,7 +88,8 @@ maxwell_bloch_status maxwell_bloch_step(maxwell_bloch_solver *s, double h);
 /* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 maxwell_bloch_status maxwell_bloch_integrate(maxwell_bloch_solver *s, double h, size_t steps);
 
-/* Many members, each integrated by itself, in place: x[i * members + m] is coordinate i of member m.
+/* Many members, in place: x[i * members + m] is coordinate i of member m. 8 are integrated
+   side by side, and with OpenMP such groups in parallel.
    status (or NULL) receives the status of each member; a failed member keeps its last good state.
    Returns the first status that is not OK. */
 maxwell_bloch_status maxwell_bloch_ensemble(const maxwell_bloch_params *params, double *x, size_t members,

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 76d86de6a33bdfdccfc4a50973b8b6b11110c3ee2c9d7fc01806f5e41d71dfe6
+ * body-sha256: a52c2caecbfd3e9a92b71b19cd80940fc79e1f25fa5f3bb5f77a263866c06a3b
  */
 #include "nambu_pendulum.h"
 
@@ -221,7 +221,7 @@ static void nambu_pendulum_fit(nambu_pendulum_memory *memory)
     memory->fitting = 1;
     ++memory->fits;
     memory->slow = 0;
-    memory->patience = memory->patience < 10000 ? 2 * memory->patience + 96 : 20000;
+    memory->patience = memory->patience < 10000 ? 2 * memory->patience + 1000 : 20000;
 }
 
 /* Take in the solved value: what took one iteration needs no better guess. */
@@ -461,6 +461,7 @@ static nambu_pendulum_status nambu_pendulum_set_step(nambu_pendulum_solver *s, d
     for (int stage = 0; stage < 1; ++stage)
         nambu_pendulum_prepare(&s->params, nambu_pendulum_fractions[stage] * h, s->coef[stage]);
     memset(s->memory, 0, sizeof s->memory);
+    for (int stage = 0; stage < 1; ++stage) s->memory[stage].patience = 1000;
     s->h = h;
     s->ready = 1;
     return nambu_pendulum_OK;

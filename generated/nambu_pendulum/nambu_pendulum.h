@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 1f4d84bedf3dcff2ecf436a531ba208b2ccb255220eb0acb5d8d302cc00d4a13
+ * body-sha256: 556368325d18a06e41c91ed598459e9c172577a292c90e0cba5b88d32d2b0f25
  */
 #ifndef NAMBU_PENDULUM_H
 #define NAMBU_PENDULUM_H
@@ -81,7 +81,7 @@ nambu_pendulum_status nambu_pendulum_step(nambu_pendulum_solver *s, double h);
 /* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 nambu_pendulum_status nambu_pendulum_integrate(nambu_pendulum_solver *s, double h, size_t steps);
 
-/* Many members, each integrated by itself, in place: x[i * members + m] is coordinate i of member m.
+/* Many members, in place: x[i * members + m] is coordinate i of member m. Each is integrated by itself.
    status (or NULL) receives the status of each member; a failed member keeps its last good state.
    Returns the first status that is not OK. */
 nambu_pendulum_status nambu_pendulum_ensemble(const nambu_pendulum_params *params, double *x, size_t members,

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: faae130268b7b6343c78709d10a447c36b3dd27bb7bd61c7b6e3bd49ac790cde
+ * body-sha256: da9fab25a2dca8dce6fbc09c29f0f228946bab39577ad1bb587e14b8c03fd4a8
  */
 #ifndef PENDULUM_H
 #define PENDULUM_H
@@ -87,7 +87,8 @@ pendulum_status pendulum_step(pendulum_solver *s, double h);
 /* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 pendulum_status pendulum_integrate(pendulum_solver *s, double h, size_t steps);
 
-/* Many members, each integrated by itself, in place: x[i * members + m] is coordinate i of member m.
+/* Many members, in place: x[i * members + m] is coordinate i of member m. 8 are integrated
+   side by side, and with OpenMP such groups in parallel.
    status (or NULL) receives the status of each member; a failed member keeps its last good state.
    Returns the first status that is not OK. */
 pendulum_status pendulum_ensemble(const pendulum_params *params, double *x, size_t members, double h,

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: cef05f81d4d8e5c4b58bcd927df9612d448fd0adc12d54208e6604a63784f8a0
+ * body-sha256: a8672a66435c70007382fe147697e616ee44f279d36057d38f87f201ddac1f14
  */
 #include "pendulum_euler.h"
 
@@ -115,6 +115,7 @@ static pendulum_euler_status pendulum_euler_set_step(pendulum_euler_solver *s, d
     for (int stage = 0; stage < 1; ++stage)
         pendulum_euler_prepare(&s->params, pendulum_euler_fractions[stage] * h, s->coef[stage]);
     memset(s->memory, 0, sizeof s->memory);
+    for (int stage = 0; stage < 1; ++stage) s->memory[stage].patience = 1000;
     s->h = h;
     s->ready = 1;
     return pendulum_euler_OK;

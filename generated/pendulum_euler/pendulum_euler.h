@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: af5114e2989232c2f9f5c9bdf71732188982625327c158fdeddf0067c9ffd0eb
+ * body-sha256: 327073f9a5a8ad5c429c6593ef58fa86cbc95a24fd785fbe887815dd53a7e1c5
  */
 #ifndef PENDULUM_EULER_H
 #define PENDULUM_EULER_H
@@ -81,7 +81,7 @@ pendulum_euler_status pendulum_euler_step(pendulum_euler_solver *s, double h);
 /* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 pendulum_euler_status pendulum_euler_integrate(pendulum_euler_solver *s, double h, size_t steps);
 
-/* Many members, each integrated by itself, in place: x[i * members + m] is coordinate i of member m.
+/* Many members, in place: x[i * members + m] is coordinate i of member m. Each is integrated by itself.
    status (or NULL) receives the status of each member; a failed member keeps its last good state.
    Returns the first status that is not OK. */
 pendulum_euler_status pendulum_euler_ensemble(const pendulum_euler_params *params, double *x, size_t members,

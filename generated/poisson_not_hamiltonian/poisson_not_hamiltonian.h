@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 22ade35d5f1dde19c70abfd51ebb610fa3cef46feefa4256e2b681b5fe5dc758
+ * body-sha256: 487f4e70cd07ef68185c5123a37eb139bdd2687eaf6f47806b9924e07786e744
  */
 #ifndef POISSON_NOT_HAMILTONIAN_H
 #define POISSON_NOT_HAMILTONIAN_H
@@ -89,7 +89,8 @@ poisson_not_hamiltonian_status poisson_not_hamiltonian_step(poisson_not_hamilton
 /* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 poisson_not_hamiltonian_status poisson_not_hamiltonian_integrate(poisson_not_hamiltonian_solver *s, double h, size_t steps);
 
-/* Many members, each integrated by itself, in place: x[i * members + m] is coordinate i of member m.
+/* Many members, in place: x[i * members + m] is coordinate i of member m. 8 are integrated
+   side by side, and with OpenMP such groups in parallel.
    status (or NULL) receives the status of each member; a failed member keeps its last good state.
    Returns the first status that is not OK. */
 poisson_not_hamiltonian_status poisson_not_hamiltonian_ensemble(const poisson_not_hamiltonian_params *params,

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 850fce6dd145e78c614f6847351302e2479040baf2bdbc2196fcca3f30a05a35
+ * body-sha256: 86f1a0c83522ed445be9a51611bfd281f3329f5928e1327ca45aeeb1ff7de6cc
  */
 #ifndef PREDATOR_PREY_H
 #define PREDATOR_PREY_H
@@ -91,7 +91,8 @@ predator_prey_status predator_prey_step(predator_prey_solver *s, double h);
 /* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 predator_prey_status predator_prey_integrate(predator_prey_solver *s, double h, size_t steps);
 
-/* Many members, each integrated by itself, in place: x[i * members + m] is coordinate i of member m.
+/* Many members, in place: x[i * members + m] is coordinate i of member m. 8 are integrated
+   side by side, and with OpenMP such groups in parallel.
    status (or NULL) receives the status of each member; a failed member keeps its last good state.
    Returns the first status that is not OK. */
 predator_prey_status predator_prey_ensemble(const predator_prey_params *params, double *x, size_t members,

@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: fca53ebb18f5f1201ae0da0f769b53768900353fce164c0d4bfcf6a0076d6b57
+ * body-sha256: f99861b3bac9b1b355d17d52825c94a7429890f6f774526a0c30829ff5285d99
  */
 #ifndef RIGID_BODY_H
 #define RIGID_BODY_H
@@ -95,7 +95,8 @@ rigid_body_status rigid_body_step(rigid_body_solver *s, double h);
 /* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 rigid_body_status rigid_body_integrate(rigid_body_solver *s, double h, size_t steps);
 
-/* Many members, each integrated by itself, in place: x[i * members + m] is coordinate i of member m.
+/* Many members, in place: x[i * members + m] is coordinate i of member m. 8 are integrated
+   side by side, and with OpenMP such groups in parallel.
    status (or NULL) receives the status of each member; a failed member keeps its last good state.
    Returns the first status that is not OK. */
 rigid_body_status rigid_body_ensemble(const rigid_body_params *params, double *x, size_t members, double h,

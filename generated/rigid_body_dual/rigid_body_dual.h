@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: b4efea665f790760725458293fbd93855e14cb47ec7120da08849ceaba7ab590
+ * body-sha256: 4454c6d98e8a12aa71f8183dab1b7249b5237fa13acb2d094bb6338801dc2f34
  */
 #ifndef RIGID_BODY_DUAL_H
 #define RIGID_BODY_DUAL_H
@@ -97,7 +97,8 @@ rigid_body_dual_status rigid_body_dual_step(rigid_body_dual_solver *s, double h)
 /* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 rigid_body_dual_status rigid_body_dual_integrate(rigid_body_dual_solver *s, double h, size_t steps);
 
-/* Many members, each integrated by itself, in place: x[i * members + m] is coordinate i of member m.
+/* Many members, in place: x[i * members + m] is coordinate i of member m. 8 are integrated
+   side by side, and with OpenMP such groups in parallel.
    status (or NULL) receives the status of each member; a failed member keeps its last good state.
    Returns the first status that is not OK. */
 rigid_body_dual_status rigid_body_dual_ensemble(const rigid_body_dual_params *params, double *x,

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 01fadbf09eb23eff8c4f7ab4cd9a865d84994a2e392149cc986b769b09ba97dc
+ * body-sha256: 14e1923da833e8c716ce9a072b9aec571d9e9d73b6429137b50609fd388a9db0
  */
 #ifndef RIGID_BODY_PAPER_H
 #define RIGID_BODY_PAPER_H
@@ -90,7 +90,8 @@ rigid_body_paper_status rigid_body_paper_step(rigid_body_paper_solver *s, double
 /* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 rigid_body_paper_status rigid_body_paper_integrate(rigid_body_paper_solver *s, double h, size_t steps);
 
-/* Many members, each integrated by itself, in place: x[i * members + m] is coordinate i of member m.
+/* Many members, in place: x[i * members + m] is coordinate i of member m. 8 are integrated
+   side by side, and with OpenMP such groups in parallel.
    status (or NULL) receives the status of each member; a failed member keeps its last good state.
    Returns the first status that is not OK. */
 rigid_body_paper_status rigid_body_paper_ensemble(const rigid_body_paper_params *params, double *x,

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 0f0591f930a33afa26e3b4afa4ed1548108c0c6ac44f9e566a441eb237fe06ab
+ * body-sha256: 481c6435c9f1f0a11b586998af06f8ecf24619f5fafd9b5cb848a3f7593f73bc
  */
 #include "sir_epidemic.h"
 
@@ -224,7 +224,7 @@ static void sir_epidemic_fit(sir_epidemic_memory *memory)
     memory->fitting = 1;
     ++memory->fits;
     memory->slow = 0;
-    memory->patience = memory->patience < 10000 ? 2 * memory->patience + 96 : 20000;
+    memory->patience = memory->patience < 10000 ? 2 * memory->patience + 1000 : 20000;
 }
 
 /* Take in the solved value: what took one iteration needs no better guess. */
@@ -461,6 +461,7 @@ static sir_epidemic_status sir_epidemic_set_step(sir_epidemic_solver *s, double 
     for (int stage = 0; stage < 1; ++stage)
         sir_epidemic_prepare(&s->params, sir_epidemic_fractions[stage] * h, s->coef[stage]);
     memset(s->memory, 0, sizeof s->memory);
+    for (int stage = 0; stage < 1; ++stage) s->memory[stage].patience = 1000;
     s->h = h;
     s->ready = 1;
     return sir_epidemic_OK;

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 9b0bae22c3f6013e9a87815e2cc445ef99dba207f90228ababb2b7a69f4538e3
+ * body-sha256: 814ef90a7a420cbaa939fe5a33715adfda59f5ba2b381be3502825cb917fef1c
  */
 #ifndef SIR_EPIDEMIC_H
 #define SIR_EPIDEMIC_H
@@ -82,7 +82,7 @@ sir_epidemic_status sir_epidemic_step(sir_epidemic_solver *s, double h);
 /* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 sir_epidemic_status sir_epidemic_integrate(sir_epidemic_solver *s, double h, size_t steps);
 
-/* Many members, each integrated by itself, in place: x[i * members + m] is coordinate i of member m.
+/* Many members, in place: x[i * members + m] is coordinate i of member m. Each is integrated by itself.
    status (or NULL) receives the status of each member; a failed member keeps its last good state.
    Returns the first status that is not OK. */
 sir_epidemic_status sir_epidemic_ensemble(const sir_epidemic_params *params, double *x, size_t members,

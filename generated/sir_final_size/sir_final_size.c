@@ -12,7 +12,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: a376d2128d6beda516787a102c4d07fa068db797101046212fc9d6a1046c21af
+ * body-sha256: 2291e10af5543a733730dd421438c3ce5daae8aaca267f4d947259a85da19f9a
  */
 #include "sir_final_size.h"
 
@@ -216,7 +216,7 @@ static void sir_final_size_fit(sir_final_size_memory *memory)
     memory->fitting = 1;
     ++memory->fits;
     memory->slow = 0;
-    memory->patience = memory->patience < 10000 ? 2 * memory->patience + 96 : 20000;
+    memory->patience = memory->patience < 10000 ? 2 * memory->patience + 1000 : 20000;
 }
 
 /* Take in the solved value: what took one iteration needs no better guess. */
@@ -463,6 +463,7 @@ static sir_final_size_status sir_final_size_set_step(sir_final_size_solver *s, d
     for (int stage = 0; stage < 1; ++stage)
         sir_final_size_prepare(&s->params, sir_final_size_fractions[stage] * h, s->coef[stage]);
     memset(s->memory, 0, sizeof s->memory);
+    for (int stage = 0; stage < 1; ++stage) s->memory[stage].patience = 1000;
     s->h = h;
     s->ready = 1;
     return sir_final_size_OK;

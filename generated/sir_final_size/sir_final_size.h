@@ -12,7 +12,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 3f3d7e83768bb036a44d715e10fe321cd38bf7a0fecc57fd13e9d523428c18ce
+ * body-sha256: 6f74f5764dbed91c6b3f1f4ebaeb16138f6e63f32a393bc0e3d9e941b3e764f6
  */
 #ifndef SIR_FINAL_SIZE_H
 #define SIR_FINAL_SIZE_H
@@ -81,7 +81,7 @@ sir_final_size_status sir_final_size_step(sir_final_size_solver *s, double h);
 /* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 sir_final_size_status sir_final_size_integrate(sir_final_size_solver *s, double h, size_t steps);
 
-/* Many members, each integrated by itself, in place: x[i * members + m] is coordinate i of member m.
+/* Many members, in place: x[i * members + m] is coordinate i of member m. Each is integrated by itself.
    status (or NULL) receives the status of each member; a failed member keeps its last good state.
    Returns the first status that is not OK. */
 sir_final_size_status sir_final_size_ensemble(const sir_final_size_params *params, double *x, size_t members,

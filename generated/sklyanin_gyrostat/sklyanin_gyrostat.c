@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 169e43e5d33534e30d0dc891c70375258048e58485e88aef33e2ede7a911cf1e
+ * body-sha256: 53fbebdefc1b2a0bb5c5fe032d3161e2e516bc23af579d1de98e0c1266a09f24
  */
 #include "sklyanin_gyrostat.h"
 
@@ -320,7 +320,7 @@ static void sklyanin_gyrostat_fit(sklyanin_gyrostat_memory *memory)
     memory->fitting = 1;
     ++memory->fits;
     memory->slow = 0;
-    memory->patience = memory->patience < 10000 ? 2 * memory->patience + 96 : 20000;
+    memory->patience = memory->patience < 10000 ? 2 * memory->patience + 1000 : 20000;
 }
 
 /* Take in the solved value: what took one iteration needs no better guess. */
@@ -785,6 +785,7 @@ static sklyanin_gyrostat_status sklyanin_gyrostat_set_step(sklyanin_gyrostat_sol
     for (int stage = 0; stage < 1; ++stage)
         sklyanin_gyrostat_prepare(&s->params, s->gauge, sklyanin_gyrostat_fractions[stage] * h, s->coef[stage]);
     memset(s->memory, 0, sizeof s->memory);
+    for (int stage = 0; stage < 1; ++stage) s->memory[stage].patience = 1000;
     s->h = h;
     s->ready = 1;
     return sklyanin_gyrostat_OK;

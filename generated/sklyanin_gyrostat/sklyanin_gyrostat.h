@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 9e92a1462ce1946d335eab6805022f86552f0970dfd0d6cf6e519265e82b5122
+ * body-sha256: 321acec7ea3669230343a4c8221c884113f70ab3cf3338552cf253b861dd227a
  */
 #ifndef SKLYANIN_GYROSTAT_H
 #define SKLYANIN_GYROSTAT_H
@@ -88,7 +88,7 @@ sklyanin_gyrostat_status sklyanin_gyrostat_step(sklyanin_gyrostat_solver *s, dou
 /* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 sklyanin_gyrostat_status sklyanin_gyrostat_integrate(sklyanin_gyrostat_solver *s, double h, size_t steps);
 
-/* Many members, each integrated by itself, in place: x[i * members + m] is coordinate i of member m.
+/* Many members, in place: x[i * members + m] is coordinate i of member m. Each is integrated by itself.
    status (or NULL) receives the status of each member; a failed member keeps its last good state.
    Returns the first status that is not OK. */
 sklyanin_gyrostat_status sklyanin_gyrostat_ensemble(const sklyanin_gyrostat_params *params, double *x,

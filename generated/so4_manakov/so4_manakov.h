@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: a682de5e160318d5d368ee0226bf65aad000ab0fa8603ebdd595b04aa441d8e6
+ * body-sha256: a5a2b81f9aa1c86f3bb412979b6f59564271515d46c5d041c3bc3a5bf803d1b0
  */
 #ifndef SO4_MANAKOV_H
 #define SO4_MANAKOV_H
@@ -94,7 +94,8 @@ so4_manakov_status so4_manakov_step(so4_manakov_solver *s, double h);
 /* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 so4_manakov_status so4_manakov_integrate(so4_manakov_solver *s, double h, size_t steps);
 
-/* Many members, each integrated by itself, in place: x[i * members + m] is coordinate i of member m.
+/* Many members, in place: x[i * members + m] is coordinate i of member m. 8 are integrated
+   side by side, and with OpenMP such groups in parallel.
    status (or NULL) receives the status of each member; a failed member keeps its last good state.
    Returns the first status that is not OK. */
 so4_manakov_status so4_manakov_ensemble(const so4_manakov_params *params, double *x, size_t members, double h,

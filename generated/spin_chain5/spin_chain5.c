@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: ad72e49042091e95249a0fe31f3d58cad3c3a3e38c50d50ec456e72c3b065ff1
+ * body-sha256: 54da7a88564fcf559894e7f29d6ee10b1f256c9ae85cf0810a89748acea1f902
  */
 #include "spin_chain5.h"
 
@@ -1807,7 +1807,7 @@ static void spin_chain5_fit(spin_chain5_memory *memory)
     memory->fitting = 1;
     ++memory->fits;
     memory->slow = 0;
-    memory->patience = memory->patience < 10000 ? 2 * memory->patience + 96 : 20000;
+    memory->patience = memory->patience < 10000 ? 2 * memory->patience + 1000 : 20000;
 }
 
 /* Take in the solved value: what took one iteration needs no better guess. */
@@ -2491,6 +2491,7 @@ static spin_chain5_status spin_chain5_set_step(spin_chain5_solver *s, double h)
     for (int stage = 0; stage < 1; ++stage)
         spin_chain5_prepare(&s->params, s->gauge, spin_chain5_fractions[stage] * h, s->coef[stage]);
     memset(s->memory, 0, sizeof s->memory);
+    for (int stage = 0; stage < 1; ++stage) s->memory[stage].patience = 1000;
     s->pause = 16;
     s->setback = s->foreseeing = 0;
     s->doubt = s->retry = 0;
@@ -4162,6 +4163,33 @@ static void spin_chain5_sizes(spin_chain5_lanes y[restrict 15], spin_chain5_lane
     }
 }
 
+/* Correct y by the residuals, with the inverse in the table, and measure the corrections. */
+static void spin_chain5_correct(spin_chain5_lines *line, spin_chain5_lanes size)
+{
+    spin_chain5_lanes delta[15];
+    memset(delta, 0, sizeof delta);
+    for (int i = 0; i < 15; ++i)
+        for (int j = 0; j < 15; ++j) {
+            spin_chain5_EACH_LANE
+            for (int lane = 0; lane < spin_chain5_LANES; ++lane)
+                delta[i][lane] += line->inverse[i * 15 + j][lane] * line->residual[j][lane];
+        }
+    spin_chain5_sizes(line->y, delta, size);
+    for (int i = 0; i < 15; ++i)
+        for (int lane = 0; lane < spin_chain5_LANES; ++lane) line->y[i][lane] -= delta[i][lane];
+}
+
+/* The largest size; infinite if one is not finite. */
+static double spin_chain5_largest(const spin_chain5_lanes size)
+{
+    double largest = 0.0, total = 0.0;
+    for (int lane = 0; lane < spin_chain5_LANES; ++lane) {
+        total += size[lane];
+        largest = size[lane] > largest ? size[lane] : largest;
+    }
+    return isfinite(total) ? largest : HUGE_VAL;
+}
+
 /* The steps of a block one after the other, each along the lines of its lane. As X, the state with its carry, gains
    increment - gain residual, the next residual follows from this one; X itself is added up apart. */
 static void spin_chain5_chain(spin_chain5_lines line[1], double x[15], double carry[15])
@@ -4224,28 +4252,6 @@ static void spin_chain5_foresee(const spin_chain5_memory *memory, spin_chain5_la
     }
 }
 
-/* Correct y by the residuals that the chain found. The largest size of a correction; infinite if one is not finite. */
-static double spin_chain5_correct(spin_chain5_lines *line)
-{
-    spin_chain5_lanes size, delta[15];
-    double largest = 0.0, total = 0.0;
-    memset(delta, 0, sizeof delta);
-    for (int i = 0; i < 15; ++i)
-        for (int j = 0; j < 15; ++j) {
-            spin_chain5_EACH_LANE
-            for (int lane = 0; lane < spin_chain5_LANES; ++lane)
-                delta[i][lane] += line->inverse[i * 15 + j][lane] * line->residual[j][lane];
-        }
-    spin_chain5_sizes(line->y, delta, size);
-    for (int i = 0; i < 15; ++i)
-        for (int lane = 0; lane < spin_chain5_LANES; ++lane) line->y[i][lane] -= delta[i][lane];
-    for (int lane = 0; lane < spin_chain5_LANES; ++lane) {
-        total += size[lane];
-        largest = size[lane] > largest ? size[lane] : largest;
-    }
-    return isfinite(total) ? largest : HUGE_VAL;
-}
-
 /* Guesses where no recurrence is known: midpoints of steps by the classical Runge-Kutta method. */
 static void spin_chain5_march(const spin_chain5_solver *s, spin_chain5_lines line[1])
 {
@@ -4275,6 +4281,7 @@ static void spin_chain5_march(const spin_chain5_solver *s, spin_chain5_lines lin
 static int spin_chain5_block(spin_chain5_solver *s, spin_chain5_table *table, int most)
 {
     spin_chain5_lines line[1];
+    spin_chain5_lanes sizes;
     double x[15], carry[15], value[15], previous = HUGE_VAL;
     int passes = 0, solved = 0;
     if (!s->foreseeing) spin_chain5_march(s, line);
@@ -4286,7 +4293,10 @@ static int spin_chain5_block(spin_chain5_solver *s, spin_chain5_table *table, in
         memcpy(x, s->x, sizeof x);
         memcpy(carry, s->carry, sizeof carry);
         spin_chain5_chain(line, x, carry);
-        for (int stage = 0; stage < 1; ++stage) size = fmax(size, spin_chain5_correct(&line[stage]));
+        for (int stage = 0; stage < 1; ++stage) {
+            spin_chain5_correct(&line[stage], sizes);
+            size = fmax(size, spin_chain5_largest(sizes));
+        }
         s->evaluations += 1 * spin_chain5_LANES;
         const double growth = size / (previous * previous);
         /* The second test: after the square of so small a correction there is rounding only. */
@@ -4311,7 +4321,8 @@ static int spin_chain5_block(spin_chain5_solver *s, spin_chain5_table *table, in
     return passes;
 }
 
-/* How the next block is guessed: by recurrences once they are fitted, which takes a thousand steps to repay. */
+/* How the next block is guessed: by recurrences, fitted as soon as enough steps are to be made, or
+   have been, to repay that. */
 static void spin_chain5_choose_guess(spin_chain5_solver *s, size_t steps)
 {
     for (int stage = 0; stage < 1; ++stage)
@@ -4319,7 +4330,7 @@ static void spin_chain5_choose_guess(spin_chain5_solver *s, size_t steps)
             s->foreseeing = 0;
             return;
         }
-    if (s->foreseeing || steps < 1000 || s->steps < s->retry) return;
+    if (s->foreseeing || (steps < 4000 && s->steps < 4000) || s->steps < s->retry) return;
     for (int stage = 0; stage < 1; ++stage) spin_chain5_fit(&s->memory[stage]);
     s->foreseeing = 1;
     s->pause = spin_chain5_LANES;
@@ -4331,7 +4342,7 @@ static void spin_chain5_learn_from(spin_chain5_solver *s, int passes)
 {
     if (s->foreseeing && (passes == 0 || (passes > 1 && passes >= s->passes))) {
         s->foreseeing = 0;
-        s->doubt = 2 * s->doubt + 2000;
+        s->doubt = 2 * s->doubt + 4000;
         s->retry = s->steps + s->doubt;
     } else if (passes == 0) {
         s->setback = 2 * s->setback + spin_chain5_LANES > 1000 ? 1000 : 2 * s->setback + spin_chain5_LANES;
@@ -4374,22 +4385,290 @@ spin_chain5_status spin_chain5_integrate(spin_chain5_solver *s, double h, size_t
     return status;
 }
 
+/* Members of an ensemble, each in its lane. */
+typedef struct {
+    spin_chain5_lanes x[15], carry[15], coef[1][33];
+    spin_chain5_lanes past[1][96][15]; /* solved values, in a ring */
+    spin_chain5_lanes weight[1][32][15]; /* of past values, the latest first, for the next */
+    int latest;     /* the row of the latest values */
+    int count;      /* rows in use */
+    int order[1];   /* how many of them the extrapolation uses */
+    int fits;       /* how often recurrences have been fitted */
+    int fitting[1]; /* whether they are the better guess */
+    int slow;       /* how many of the last steps took more than one iteration */
+    int patience;   /* how many of those before recurrences are fitted again */
+    int active[8];  /* whether the lane has a member that has not failed */
+    size_t left[8]; /* steps that it has still to make */
+    double gauge[8][5]; /* of each member */
+} spin_chain5_group;
+
+/* The past values of a stage, the latest for k = 0. */
+static spin_chain5_lanes *spin_chain5_group_past(spin_chain5_group *group, int stage, int k)
+{
+    return group->past[stage][(group->latest + k) % 96];
+}
+
+/* Guess the values of a stage by the recurrences of the members. */
+static void spin_chain5_group_foresee(spin_chain5_group *group, int stage, spin_chain5_lanes y[restrict 15])
+{
+    memset(y, 0, 15 * sizeof y[0]);
+    for (int k = 0; k < 32; ++k) {
+        spin_chain5_lanes *past = spin_chain5_group_past(group, stage, k), *weight = group->weight[stage][k];
+        for (int i = 0; i < 15; ++i) {
+            spin_chain5_EACH_LANE
+            for (int lane = 0; lane < spin_chain5_LANES; ++lane) y[i][lane] += weight[i][lane] * past[i][lane];
+        }
+    }
+}
+
+/* Extrapolate the values of a stage. */
+static void spin_chain5_group_extrapolate(spin_chain5_group *group, int stage, spin_chain5_lanes y[restrict 15])
+{
+    const int order = group->order[stage];
+    double binomial = -1.0;
+    memcpy(y, group->x, 15 * sizeof y[0]);
+    if (order > 0) memset(y, 0, 15 * sizeof y[0]);
+    for (int k = 0; k < order; ++k) {
+        spin_chain5_lanes *past = spin_chain5_group_past(group, stage, k);
+        binomial *= -(double)(order - k) / (k + 1);
+        for (int i = 0; i < 15; ++i) {
+            spin_chain5_EACH_LANE
+            for (int lane = 0; lane < spin_chain5_LANES; ++lane) y[i][lane] += binomial * past[i][lane];
+        }
+    }
+}
+
+/* The sum over members of the absolute values of all components. */
+static double spin_chain5_group_sum(const spin_chain5_group *group, spin_chain5_lanes y[15])
+{
+    double sum = 0.0;
+    for (int i = 0; i < 15; ++i)
+        for (int lane = 0; lane < spin_chain5_LANES; ++lane) sum += group->active[lane] ? fabs(y[i][lane]) : 0.0;
+    return sum;
+}
+
+static void spin_chain5_group_subtract(spin_chain5_lanes y[restrict 15], spin_chain5_lanes other[restrict 15])
+{
+    for (int i = 0; i < 15; ++i) {
+        spin_chain5_EACH_LANE
+        for (int lane = 0; lane < spin_chain5_LANES; ++lane) y[i][lane] -= other[i][lane];
+    }
+}
+
+/* Choose the guess that would have been best for these values. */
+static void spin_chain5_group_judge(spin_chain5_group *group, int stage, spin_chain5_lanes y[15])
+{
+    spin_chain5_lanes row[8 + 1][15];
+    const int rows = group->count < 8 ? group->count : 8;
+    double least = HUGE_VAL;
+    memcpy(row[0], y, sizeof row[0]);
+    for (int k = 0; k < rows; ++k) memcpy(row[k + 1], spin_chain5_group_past(group, stage, k), sizeof row[0]);
+    if (group->order[stage] == 0) group->order[stage] = 1;
+    for (int order = 1; order <= rows; ++order) { /* row[0] becomes the backward difference of this order */
+        for (int k = 0; k <= rows - order; ++k) spin_chain5_group_subtract(row[k], row[k + 1]);
+        const double size = spin_chain5_group_sum(group, row[0]);
+        if (size < least) {
+            least = size;
+            group->order[stage] = order;
+        }
+    }
+    if (group->fits == 0) return;
+    spin_chain5_group_foresee(group, stage, row[0]);
+    spin_chain5_group_subtract(row[0], y);
+    group->fitting[stage] = spin_chain5_group_sum(group, row[0]) <= least;
+}
+
+/* Fit the recurrences of all members; with every time, wait longer before it is done again. */
+static void spin_chain5_group_fit(spin_chain5_group *group)
+{
+    spin_chain5_memory memory;
+    memory.count = 96;
+    for (int stage = 0; stage < 1; ++stage)
+        for (int lane = 0; lane < spin_chain5_LANES; ++lane) {
+            for (int i = 0; i < 15; ++i) {
+                for (int k = 0; k < 96; ++k)
+                    memory.past[96 - 1 - k][i] = spin_chain5_group_past(group, stage, k)[i][lane];
+                if (group->active[lane]) spin_chain5_train(&memory, i);
+                for (int k = 0; k < 32 && group->active[lane]; ++k)
+                    group->weight[stage][k][i][lane] = memory.weight[k][i][0];
+            }
+            group->fitting[stage] = 1;
+        }
+    ++group->fits;
+    group->slow = 0;
+    group->patience = group->patience < 10000 ? 2 * group->patience + 1000 : 20000;
+}
+
+/* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group. */
+static int spin_chain5_group_open(spin_chain5_group *group, const spin_chain5_lanes size, const spin_chain5_lanes previous)
+{
+    int open = 0;
+    for (int lane = 0; lane < spin_chain5_LANES; ++lane) {
+        const double growth = size[lane] / (previous[lane] * previous[lane]);
+        const double remaining = size[lane] * size[lane] * (growth > 1.0 ? growth : 1.0);
+        const int solved = remaining <= 1e-20 || (previous[lane] < 1e-8 && size[lane] < 1e-10);
+        if (!isfinite(size[lane])) group->active[lane] = 0;
+        open += group->active[lane] && !solved;
+    }
+    return open;
+}
+
+/* Newton's method for a stage, until the slowest lane is solved. The number of iterations; where that is the most
+   allowed, lanes that are not solved leave the group. */
+static int spin_chain5_group_solve(spin_chain5_group *group, int stage, spin_chain5_lines *line)
+{
+    spin_chain5_lanes size, previous;
+    int iterations = 0, open = 1;
+    for (int lane = 0; lane < spin_chain5_LANES; ++lane) size[lane] = HUGE_VAL;
+    if (group->fitting[stage]) spin_chain5_group_foresee(group, stage, line->y);
+    else spin_chain5_group_extrapolate(group, stage, line->y);
+    for (; open > 0 && iterations < 20; ++iterations) {
+        memcpy(previous, size, sizeof size);
+        spin_chain5_tabulate(group->coef[stage], line);
+        for (int i = 0; i < 15; ++i) {
+            spin_chain5_EACH_LANE
+            for (int lane = 0; lane < spin_chain5_LANES; ++lane)
+                line->residual[i][lane] =
+                    ((line->y[i][lane] - group->x[i][lane]) + line->displacement[i][lane]) - group->carry[i][lane];
+        }
+        spin_chain5_correct(line, size);
+        open = spin_chain5_group_open(group, size, previous);
+    }
+    for (int lane = 0; lane < spin_chain5_LANES && open > 0; ++lane)
+        group->active[lane] = group->active[lane] && size[lane] * size[lane] <= 1e-20;
+    return iterations;
+}
+
+/* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
+static void spin_chain5_group_advance(spin_chain5_lanes x[restrict 15], spin_chain5_lanes carry[restrict 15],
+    spin_chain5_lines *line)
+{
+    for (int i = 0; i < 15; ++i)
+        for (int j = 0; j < 15; ++j) {
+            spin_chain5_EACH_LANE
+            for (int lane = 0; lane < spin_chain5_LANES; ++lane)
+                carry[i][lane] -= line->gain[i * 15 + j][lane] * line->residual[j][lane];
+        }
+    for (int i = 0; i < 15; ++i) {
+        spin_chain5_EACH_LANE
+        for (int lane = 0; lane < spin_chain5_LANES; ++lane) {
+            const double change = line->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
+            const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
+            x[i][lane] = sum + small;
+            carry[i][lane] = small - (x[i][lane] - sum);
+        }
+    }
+}
+
+/* One step of all members. One that fails keeps its state, and leaves. How many are left. */
+static int spin_chain5_group_step(spin_chain5_group *group)
+{
+    spin_chain5_lanes x[15], carry[15];
+    spin_chain5_lines line;
+    const int next = (group->latest + 96 - 1) % 96;
+    int active = 0, most = 0;
+    memcpy(x, group->x, sizeof x);
+    memcpy(carry, group->carry, sizeof carry);
+    for (int stage = 0; stage < 1; ++stage) {
+        const int iterations = spin_chain5_group_solve(group, stage, &line);
+        spin_chain5_group_advance(group->x, group->carry, &line);
+        if (next % 8 == 0 || group->count < 8) spin_chain5_group_judge(group, stage, line.y);
+        if (iterations > most) most = iterations;
+        memcpy(group->past[stage][next], line.y, sizeof line.y);
+    }
+    group->latest = next;
+    if (group->count < 96) ++group->count;
+    group->slow = most > 1 ? group->slow + 1 : 0;
+    if (group->slow > group->patience && group->count == 96) spin_chain5_group_fit(group);
+    for (int lane = 0; lane < spin_chain5_LANES; ++lane) {
+        for (int i = 0; i < 15; ++i)
+            if (!isfinite(group->x[i][lane])) group->active[lane] = 0;
+        for (int i = 0; i < 15 && !group->active[lane]; ++i) {
+            group->x[i][lane] = x[i][lane];
+            group->carry[i][lane] = carry[i][lane];
+        }
+        group->left[lane] -= group->active[lane] != 0;
+        active += group->active[lane] != 0;
+    }
+    return active;
+}
+
+/* Put a member into a lane: its state, and its coefficients. */
+static spin_chain5_status spin_chain5_group_join(spin_chain5_group *group, int lane, const spin_chain5_params *params,
+    const double x0[15], double h)
+{
+    spin_chain5_solver s;
+    spin_chain5_status status = spin_chain5_init(&s, params, x0);
+    if (status == spin_chain5_OK) status = spin_chain5_set_step(&s, h);
+    if (status != spin_chain5_OK) return status;
+    for (int i = 0; i < 15; ++i) group->x[i][lane] = s.x[i];
+    for (int stage = 0; stage < 1; ++stage)
+        for (int k = 0; k < 33; ++k) group->coef[stage][k][lane] = s.coef[stage][k];
+    memcpy(group->gauge[lane], s.gauge, sizeof s.gauge);
+    group->active[lane] = 1;
+    return status;
+}
+
+/* The steps that a member has still to make after it left the group, by itself. */
+static spin_chain5_status spin_chain5_group_finish(const spin_chain5_group *group, int lane, const spin_chain5_params *params,
+    double x[15], double h)
+{
+    spin_chain5_solver s;
+    spin_chain5_status status = spin_chain5_init_gauge(&s, params, x, group->gauge[lane]);
+    if (status != spin_chain5_OK) return status;
+    for (int i = 0; i < 15; ++i) s.carry[i] = group->carry[i][lane];
+    status = spin_chain5_integrate(&s, h, group->left[lane]);
+    memcpy(x, s.x, sizeof s.x);
+    return status;
+}
+
+/* The members from first on, as many as there are lanes. The first status that is not OK. */
+static spin_chain5_status spin_chain5_group_run(const spin_chain5_params *params, double *x, size_t members, size_t first,
+    double h, size_t steps, unsigned char *status)
+{
+    spin_chain5_group group;
+    spin_chain5_status worst = spin_chain5_OK, member[8];
+    const int count = members - first < spin_chain5_LANES ? (int)(members - first) : spin_chain5_LANES;
+    double state[15];
+    memset(&group, 0, sizeof group);
+    group.patience = 1000;
+    for (int lane = 0; lane < count; ++lane) {
+        for (size_t i = 0; i < 15; ++i) state[i] = x[i * members + first + (size_t)lane];
+        group.left[lane] = steps;
+        member[lane] = spin_chain5_group_join(&group, lane, params, state, h);
+    }
+    for (size_t k = 0; k < steps && spin_chain5_group_step(&group) > 2; ++k) continue;
+    for (int lane = 0; lane < count; ++lane) {
+        for (int i = 0; i < 15; ++i) state[i] = group.x[i][lane];
+        if (member[lane] == spin_chain5_OK) {
+            if (group.left[lane] > 0) member[lane] = spin_chain5_group_finish(&group, lane, params, state, h);
+            for (size_t i = 0; i < 15; ++i) x[i * members + first + (size_t)lane] = state[i];
+        }
+        if (status != NULL) status[first + (size_t)lane] = (unsigned char)member[lane];
+        if (worst == spin_chain5_OK) worst = member[lane];
+    }
+    return worst;
+}
+
 spin_chain5_status spin_chain5_ensemble(const spin_chain5_params *params, double *x, size_t members, double h,
                                         size_t steps, unsigned char *status)
 {
     spin_chain5_status worst = spin_chain5_OK;
+    size_t earliest = members;
     if (x == NULL && members > 0) return spin_chain5_BAD_ARGUMENT;
-    for (size_t m = 0; m < members; ++m) {
-        spin_chain5_solver s;
-        double x0[15];
-        for (size_t i = 0; i < 15; ++i) x0[i] = x[i * members + m];
-        spin_chain5_status member = spin_chain5_init(&s, params, x0);
-        if (member == spin_chain5_OK) {
-            member = spin_chain5_integrate(&s, h, steps);
-            for (size_t i = 0; i < 15; ++i) x[i * members + m] = s.x[i];
+#ifdef _OPENMP
+#pragma omp parallel for schedule(dynamic)
+#endif
+    for (size_t first = 0; first < members; first += spin_chain5_LANES) {
+        const spin_chain5_status group = spin_chain5_group_run(params, x, members, first, h, steps, status);
+        if (group == spin_chain5_OK) continue;
+#ifdef _OPENMP
+#pragma omp critical
+#endif
+        if (first < earliest) {
+            earliest = first;
+            worst = group;
         }
-        if (status != NULL) status[m] = (unsigned char)member;
-        if (worst == spin_chain5_OK) worst = member;
     }
     return worst;
 }

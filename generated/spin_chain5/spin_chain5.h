@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 6cd1e97034c4c7c3565be0c965df546f3ac4eecfbff10e2049b02bdab5f80ee8
+ * body-sha256: 0175e813f7e2bfa6cc16ecc85ae8f1ed924363ecbd66fa8a2ec88575bc27040a
  */
 #ifndef SPIN_CHAIN5_H
 #define SPIN_CHAIN5_H
@@ -94,7 +94,8 @@ spin_chain5_status spin_chain5_step(spin_chain5_solver *s, double h);
 /* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 spin_chain5_status spin_chain5_integrate(spin_chain5_solver *s, double h, size_t steps);
 
-/* Many members, each integrated by itself, in place: x[i * members + m] is coordinate i of member m.
+/* Many members, in place: x[i * members + m] is coordinate i of member m. 8 are integrated
+   side by side, and with OpenMP such groups in parallel.
    status (or NULL) receives the status of each member; a failed member keeps its last good state.
    Returns the first status that is not OK. */
 spin_chain5_status spin_chain5_ensemble(const spin_chain5_params *params, double *x, size_t members, double h,

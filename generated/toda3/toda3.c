@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: eae8263db35988fa4e62e3d46f09aeb7b29a3caa8b906f6b6bf900eb82d6b125
+ * body-sha256: 35f379f81e9f9c6f8f0c4eafb9658867740961f89dba0baa6d7115de349542cd
  */
 #include "toda3.h"
 
@@ -439,7 +439,7 @@ static void toda3_fit(toda3_memory *memory)
     memory->fitting = 1;
     ++memory->fits;
     memory->slow = 0;
-    memory->patience = memory->patience < 10000 ? 2 * memory->patience + 96 : 20000;
+    memory->patience = memory->patience < 10000 ? 2 * memory->patience + 1000 : 20000;
 }
 
 /* Take in the solved value: what took one iteration needs no better guess. */
@@ -561,6 +561,7 @@ static toda3_status toda3_set_step(toda3_solver *s, double h)
     for (int stage = 0; stage < 1; ++stage)
         toda3_prepare(&s->params, toda3_fractions[stage] * h, s->coef[stage]);
     memset(s->memory, 0, sizeof s->memory);
+    for (int stage = 0; stage < 1; ++stage) s->memory[stage].patience = 1000;
     s->pause = 16;
     s->setback = s->foreseeing = 0;
     s->doubt = s->retry = 0;
@@ -900,6 +901,33 @@ static void toda3_sizes(toda3_lanes y[restrict 5], toda3_lanes delta[restrict 5]
     }
 }
 
+/* Correct y by the residuals, with the inverse in the table, and measure the corrections. */
+static void toda3_correct(toda3_lines *line, toda3_lanes size)
+{
+    toda3_lanes delta[5];
+    memset(delta, 0, sizeof delta);
+    for (int i = 0; i < 5; ++i)
+        for (int j = 0; j < 5; ++j) {
+            toda3_EACH_LANE
+            for (int lane = 0; lane < toda3_LANES; ++lane)
+                delta[i][lane] += line->inverse[i * 5 + j][lane] * line->residual[j][lane];
+        }
+    toda3_sizes(line->y, delta, size);
+    for (int i = 0; i < 5; ++i)
+        for (int lane = 0; lane < toda3_LANES; ++lane) line->y[i][lane] -= delta[i][lane];
+}
+
+/* The largest size; infinite if one is not finite. */
+static double toda3_largest(const toda3_lanes size)
+{
+    double largest = 0.0, total = 0.0;
+    for (int lane = 0; lane < toda3_LANES; ++lane) {
+        total += size[lane];
+        largest = size[lane] > largest ? size[lane] : largest;
+    }
+    return isfinite(total) ? largest : HUGE_VAL;
+}
+
 /* The steps of a block one after the other, each along the lines of its lane. As X, the state with its carry, gains
    increment - gain residual, the next residual follows from this one; X itself is added up apart. */
 static void toda3_chain(toda3_lines line[1], double x[5], double carry[5])
@@ -962,28 +990,6 @@ static void toda3_foresee(const toda3_memory *memory, toda3_lanes weight[restric
     }
 }
 
-/* Correct y by the residuals that the chain found. The largest size of a correction; infinite if one is not finite. */
-static double toda3_correct(toda3_lines *line)
-{
-    toda3_lanes size, delta[5];
-    double largest = 0.0, total = 0.0;
-    memset(delta, 0, sizeof delta);
-    for (int i = 0; i < 5; ++i)
-        for (int j = 0; j < 5; ++j) {
-            toda3_EACH_LANE
-            for (int lane = 0; lane < toda3_LANES; ++lane)
-                delta[i][lane] += line->inverse[i * 5 + j][lane] * line->residual[j][lane];
-        }
-    toda3_sizes(line->y, delta, size);
-    for (int i = 0; i < 5; ++i)
-        for (int lane = 0; lane < toda3_LANES; ++lane) line->y[i][lane] -= delta[i][lane];
-    for (int lane = 0; lane < toda3_LANES; ++lane) {
-        total += size[lane];
-        largest = size[lane] > largest ? size[lane] : largest;
-    }
-    return isfinite(total) ? largest : HUGE_VAL;
-}
-
 /* Guesses where no recurrence is known: midpoints of steps by the classical Runge-Kutta method. */
 static void toda3_march(const toda3_solver *s, toda3_lines line[1])
 {
@@ -1013,6 +1019,7 @@ static void toda3_march(const toda3_solver *s, toda3_lines line[1])
 static int toda3_block(toda3_solver *s, toda3_table *table, int most)
 {
     toda3_lines line[1];
+    toda3_lanes sizes;
     double x[5], carry[5], value[5], previous = HUGE_VAL;
     int passes = 0, solved = 0;
     if (!s->foreseeing) toda3_march(s, line);
@@ -1024,7 +1031,10 @@ static int toda3_block(toda3_solver *s, toda3_table *table, int most)
         memcpy(x, s->x, sizeof x);
         memcpy(carry, s->carry, sizeof carry);
         toda3_chain(line, x, carry);
-        for (int stage = 0; stage < 1; ++stage) size = fmax(size, toda3_correct(&line[stage]));
+        for (int stage = 0; stage < 1; ++stage) {
+            toda3_correct(&line[stage], sizes);
+            size = fmax(size, toda3_largest(sizes));
+        }
         s->evaluations += 1 * toda3_LANES;
         const double growth = size / (previous * previous);
         /* The second test: after the square of so small a correction there is rounding only. */
@@ -1049,7 +1059,8 @@ static int toda3_block(toda3_solver *s, toda3_table *table, int most)
     return passes;
 }
 
-/* How the next block is guessed: by recurrences once they are fitted, which takes a thousand steps to repay. */
+/* How the next block is guessed: by recurrences, fitted as soon as enough steps are to be made, or
+   have been, to repay that. */
 static void toda3_choose_guess(toda3_solver *s, size_t steps)
 {
     for (int stage = 0; stage < 1; ++stage)
@@ -1057,7 +1068,7 @@ static void toda3_choose_guess(toda3_solver *s, size_t steps)
             s->foreseeing = 0;
             return;
         }
-    if (s->foreseeing || steps < 1000 || s->steps < s->retry) return;
+    if (s->foreseeing || (steps < 4000 && s->steps < 4000) || s->steps < s->retry) return;
     for (int stage = 0; stage < 1; ++stage) toda3_fit(&s->memory[stage]);
     s->foreseeing = 1;
     s->pause = toda3_LANES;
@@ -1069,7 +1080,7 @@ static void toda3_learn_from(toda3_solver *s, int passes)
 {
     if (s->foreseeing && (passes == 0 || (passes > 1 && passes >= s->passes))) {
         s->foreseeing = 0;
-        s->doubt = 2 * s->doubt + 2000;
+        s->doubt = 2 * s->doubt + 4000;
         s->retry = s->steps + s->doubt;
     } else if (passes == 0) {
         s->setback = 2 * s->setback + toda3_LANES > 1000 ? 1000 : 2 * s->setback + toda3_LANES;
@@ -1112,22 +1123,288 @@ toda3_status toda3_integrate(toda3_solver *s, double h, size_t steps)
     return status;
 }
 
+/* Members of an ensemble, each in its lane. */
+typedef struct {
+    toda3_lanes x[5], carry[5], coef[1][10];
+    toda3_lanes past[1][96][5]; /* solved values, in a ring */
+    toda3_lanes weight[1][32][5]; /* of past values, the latest first, for the next */
+    int latest;     /* the row of the latest values */
+    int count;      /* rows in use */
+    int order[1];   /* how many of them the extrapolation uses */
+    int fits;       /* how often recurrences have been fitted */
+    int fitting[1]; /* whether they are the better guess */
+    int slow;       /* how many of the last steps took more than one iteration */
+    int patience;   /* how many of those before recurrences are fitted again */
+    int active[8];  /* whether the lane has a member that has not failed */
+    size_t left[8]; /* steps that it has still to make */
+} toda3_group;
+
+/* The past values of a stage, the latest for k = 0. */
+static toda3_lanes *toda3_group_past(toda3_group *group, int stage, int k)
+{
+    return group->past[stage][(group->latest + k) % 96];
+}
+
+/* Guess the values of a stage by the recurrences of the members. */
+static void toda3_group_foresee(toda3_group *group, int stage, toda3_lanes y[restrict 5])
+{
+    memset(y, 0, 5 * sizeof y[0]);
+    for (int k = 0; k < 32; ++k) {
+        toda3_lanes *past = toda3_group_past(group, stage, k), *weight = group->weight[stage][k];
+        for (int i = 0; i < 5; ++i) {
+            toda3_EACH_LANE
+            for (int lane = 0; lane < toda3_LANES; ++lane) y[i][lane] += weight[i][lane] * past[i][lane];
+        }
+    }
+}
+
+/* Extrapolate the values of a stage. */
+static void toda3_group_extrapolate(toda3_group *group, int stage, toda3_lanes y[restrict 5])
+{
+    const int order = group->order[stage];
+    double binomial = -1.0;
+    memcpy(y, group->x, 5 * sizeof y[0]);
+    if (order > 0) memset(y, 0, 5 * sizeof y[0]);
+    for (int k = 0; k < order; ++k) {
+        toda3_lanes *past = toda3_group_past(group, stage, k);
+        binomial *= -(double)(order - k) / (k + 1);
+        for (int i = 0; i < 5; ++i) {
+            toda3_EACH_LANE
+            for (int lane = 0; lane < toda3_LANES; ++lane) y[i][lane] += binomial * past[i][lane];
+        }
+    }
+}
+
+/* The sum over members of the absolute values of all components. */
+static double toda3_group_sum(const toda3_group *group, toda3_lanes y[5])
+{
+    double sum = 0.0;
+    for (int i = 0; i < 5; ++i)
+        for (int lane = 0; lane < toda3_LANES; ++lane) sum += group->active[lane] ? fabs(y[i][lane]) : 0.0;
+    return sum;
+}
+
+static void toda3_group_subtract(toda3_lanes y[restrict 5], toda3_lanes other[restrict 5])
+{
+    for (int i = 0; i < 5; ++i) {
+        toda3_EACH_LANE
+        for (int lane = 0; lane < toda3_LANES; ++lane) y[i][lane] -= other[i][lane];
+    }
+}
+
+/* Choose the guess that would have been best for these values. */
+static void toda3_group_judge(toda3_group *group, int stage, toda3_lanes y[5])
+{
+    toda3_lanes row[8 + 1][5];
+    const int rows = group->count < 8 ? group->count : 8;
+    double least = HUGE_VAL;
+    memcpy(row[0], y, sizeof row[0]);
+    for (int k = 0; k < rows; ++k) memcpy(row[k + 1], toda3_group_past(group, stage, k), sizeof row[0]);
+    if (group->order[stage] == 0) group->order[stage] = 1;
+    for (int order = 1; order <= rows; ++order) { /* row[0] becomes the backward difference of this order */
+        for (int k = 0; k <= rows - order; ++k) toda3_group_subtract(row[k], row[k + 1]);
+        const double size = toda3_group_sum(group, row[0]);
+        if (size < least) {
+            least = size;
+            group->order[stage] = order;
+        }
+    }
+    if (group->fits == 0) return;
+    toda3_group_foresee(group, stage, row[0]);
+    toda3_group_subtract(row[0], y);
+    group->fitting[stage] = toda3_group_sum(group, row[0]) <= least;
+}
+
+/* Fit the recurrences of all members; with every time, wait longer before it is done again. */
+static void toda3_group_fit(toda3_group *group)
+{
+    toda3_memory memory;
+    memory.count = 96;
+    for (int stage = 0; stage < 1; ++stage)
+        for (int lane = 0; lane < toda3_LANES; ++lane) {
+            for (int i = 0; i < 5; ++i) {
+                for (int k = 0; k < 96; ++k)
+                    memory.past[96 - 1 - k][i] = toda3_group_past(group, stage, k)[i][lane];
+                if (group->active[lane]) toda3_train(&memory, i);
+                for (int k = 0; k < 32 && group->active[lane]; ++k)
+                    group->weight[stage][k][i][lane] = memory.weight[k][i][0];
+            }
+            group->fitting[stage] = 1;
+        }
+    ++group->fits;
+    group->slow = 0;
+    group->patience = group->patience < 10000 ? 2 * group->patience + 1000 : 20000;
+}
+
+/* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group. */
+static int toda3_group_open(toda3_group *group, const toda3_lanes size, const toda3_lanes previous)
+{
+    int open = 0;
+    for (int lane = 0; lane < toda3_LANES; ++lane) {
+        const double growth = size[lane] / (previous[lane] * previous[lane]);
+        const double remaining = size[lane] * size[lane] * (growth > 1.0 ? growth : 1.0);
+        const int solved = remaining <= 1e-20 || (previous[lane] < 1e-8 && size[lane] < 1e-10);
+        if (!isfinite(size[lane])) group->active[lane] = 0;
+        open += group->active[lane] && !solved;
+    }
+    return open;
+}
+
+/* Newton's method for a stage, until the slowest lane is solved. The number of iterations; where that is the most
+   allowed, lanes that are not solved leave the group. */
+static int toda3_group_solve(toda3_group *group, int stage, toda3_lines *line)
+{
+    toda3_lanes size, previous;
+    int iterations = 0, open = 1;
+    for (int lane = 0; lane < toda3_LANES; ++lane) size[lane] = HUGE_VAL;
+    if (group->fitting[stage]) toda3_group_foresee(group, stage, line->y);
+    else toda3_group_extrapolate(group, stage, line->y);
+    for (; open > 0 && iterations < 20; ++iterations) {
+        memcpy(previous, size, sizeof size);
+        toda3_tabulate(group->coef[stage], line);
+        for (int i = 0; i < 5; ++i) {
+            toda3_EACH_LANE
+            for (int lane = 0; lane < toda3_LANES; ++lane)
+                line->residual[i][lane] =
+                    ((line->y[i][lane] - group->x[i][lane]) + line->displacement[i][lane]) - group->carry[i][lane];
+        }
+        toda3_correct(line, size);
+        open = toda3_group_open(group, size, previous);
+    }
+    for (int lane = 0; lane < toda3_LANES && open > 0; ++lane)
+        group->active[lane] = group->active[lane] && size[lane] * size[lane] <= 1e-20;
+    return iterations;
+}
+
+/* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
+static void toda3_group_advance(toda3_lanes x[restrict 5], toda3_lanes carry[restrict 5],
+    toda3_lines *line)
+{
+    for (int i = 0; i < 5; ++i)
+        for (int j = 0; j < 5; ++j) {
+            toda3_EACH_LANE
+            for (int lane = 0; lane < toda3_LANES; ++lane)
+                carry[i][lane] -= line->gain[i * 5 + j][lane] * line->residual[j][lane];
+        }
+    for (int i = 0; i < 5; ++i) {
+        toda3_EACH_LANE
+        for (int lane = 0; lane < toda3_LANES; ++lane) {
+            const double change = line->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
+            const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
+            x[i][lane] = sum + small;
+            carry[i][lane] = small - (x[i][lane] - sum);
+        }
+    }
+}
+
+/* One step of all members. One that fails keeps its state, and leaves. How many are left. */
+static int toda3_group_step(toda3_group *group)
+{
+    toda3_lanes x[5], carry[5];
+    toda3_lines line;
+    const int next = (group->latest + 96 - 1) % 96;
+    int active = 0, most = 0;
+    memcpy(x, group->x, sizeof x);
+    memcpy(carry, group->carry, sizeof carry);
+    for (int stage = 0; stage < 1; ++stage) {
+        const int iterations = toda3_group_solve(group, stage, &line);
+        toda3_group_advance(group->x, group->carry, &line);
+        if (next % 8 == 0 || group->count < 8) toda3_group_judge(group, stage, line.y);
+        if (iterations > most) most = iterations;
+        memcpy(group->past[stage][next], line.y, sizeof line.y);
+    }
+    group->latest = next;
+    if (group->count < 96) ++group->count;
+    group->slow = most > 1 ? group->slow + 1 : 0;
+    if (group->slow > group->patience && group->count == 96) toda3_group_fit(group);
+    for (int lane = 0; lane < toda3_LANES; ++lane) {
+        for (int i = 0; i < 5; ++i)
+            if (!isfinite(group->x[i][lane])) group->active[lane] = 0;
+        for (int i = 0; i < 5 && !group->active[lane]; ++i) {
+            group->x[i][lane] = x[i][lane];
+            group->carry[i][lane] = carry[i][lane];
+        }
+        group->left[lane] -= group->active[lane] != 0;
+        active += group->active[lane] != 0;
+    }
+    return active;
+}
+
+/* Put a member into a lane: its state, and its coefficients. */
+static toda3_status toda3_group_join(toda3_group *group, int lane, const toda3_params *params,
+    const double x0[5], double h)
+{
+    toda3_solver s;
+    toda3_status status = toda3_init(&s, params, x0);
+    if (status == toda3_OK) status = toda3_set_step(&s, h);
+    if (status != toda3_OK) return status;
+    for (int i = 0; i < 5; ++i) group->x[i][lane] = s.x[i];
+    for (int stage = 0; stage < 1; ++stage)
+        for (int k = 0; k < 10; ++k) group->coef[stage][k][lane] = s.coef[stage][k];
+    group->active[lane] = 1;
+    return status;
+}
+
+/* The steps that a member has still to make after it left the group, by itself. */
+static toda3_status toda3_group_finish(const toda3_group *group, int lane, const toda3_params *params,
+    double x[5], double h)
+{
+    toda3_solver s;
+    toda3_status status = toda3_init(&s, params, x);
+    if (status != toda3_OK) return status;
+    for (int i = 0; i < 5; ++i) s.carry[i] = group->carry[i][lane];
+    status = toda3_integrate(&s, h, group->left[lane]);
+    memcpy(x, s.x, sizeof s.x);
+    return status;
+}
+
+/* The members from first on, as many as there are lanes. The first status that is not OK. */
+static toda3_status toda3_group_run(const toda3_params *params, double *x, size_t members, size_t first,
+    double h, size_t steps, unsigned char *status)
+{
+    toda3_group group;
+    toda3_status worst = toda3_OK, member[8];
+    const int count = members - first < toda3_LANES ? (int)(members - first) : toda3_LANES;
+    double state[5];
+    memset(&group, 0, sizeof group);
+    group.patience = 1000;
+    for (int lane = 0; lane < count; ++lane) {
+        for (size_t i = 0; i < 5; ++i) state[i] = x[i * members + first + (size_t)lane];
+        group.left[lane] = steps;
+        member[lane] = toda3_group_join(&group, lane, params, state, h);
+    }
+    for (size_t k = 0; k < steps && toda3_group_step(&group) > 2; ++k) continue;
+    for (int lane = 0; lane < count; ++lane) {
+        for (int i = 0; i < 5; ++i) state[i] = group.x[i][lane];
+        if (member[lane] == toda3_OK) {
+            if (group.left[lane] > 0) member[lane] = toda3_group_finish(&group, lane, params, state, h);
+            for (size_t i = 0; i < 5; ++i) x[i * members + first + (size_t)lane] = state[i];
+        }
+        if (status != NULL) status[first + (size_t)lane] = (unsigned char)member[lane];
+        if (worst == toda3_OK) worst = member[lane];
+    }
+    return worst;
+}
+
 toda3_status toda3_ensemble(const toda3_params *params, double *x, size_t members, double h, size_t steps,
                             unsigned char *status)
 {
     toda3_status worst = toda3_OK;
+    size_t earliest = members;
     if (x == NULL && members > 0) return toda3_BAD_ARGUMENT;
-    for (size_t m = 0; m < members; ++m) {
-        toda3_solver s;
-        double x0[5];
-        for (size_t i = 0; i < 5; ++i) x0[i] = x[i * members + m];
-        toda3_status member = toda3_init(&s, params, x0);
-        if (member == toda3_OK) {
-            member = toda3_integrate(&s, h, steps);
-            for (size_t i = 0; i < 5; ++i) x[i * members + m] = s.x[i];
+#ifdef _OPENMP
+#pragma omp parallel for schedule(dynamic)
+#endif
+    for (size_t first = 0; first < members; first += toda3_LANES) {
+        const toda3_status group = toda3_group_run(params, x, members, first, h, steps, status);
+        if (group == toda3_OK) continue;
+#ifdef _OPENMP
+#pragma omp critical
+#endif
+        if (first < earliest) {
+            earliest = first;
+            worst = group;
         }
-        if (status != NULL) status[m] = (unsigned char)member;
-        if (worst == toda3_OK) worst = member;
     }
     return worst;
 }

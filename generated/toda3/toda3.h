@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 3345f30590b74db99c78148105540cbd121fe4c4ea42ed8623438d56a627d643
+ * body-sha256: 20a1cf7fa0bd1ada65da1fe2d3f45d4cfcb89a19c31324fb96dc1c63f3510881
  */
 #ifndef TODA3_H
 #define TODA3_H
@@ -87,7 +87,8 @@ toda3_status toda3_step(toda3_solver *s, double h);
 /* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 toda3_status toda3_integrate(toda3_solver *s, double h, size_t steps);
 
-/* Many members, each integrated by itself, in place: x[i * members + m] is coordinate i of member m.
+/* Many members, in place: x[i * members + m] is coordinate i of member m. 8 are integrated
+   side by side, and with OpenMP such groups in parallel.
    status (or NULL) receives the status of each member; a failed member keeps its last good state.
    Returns the first status that is not OK. */
 toda3_status toda3_ensemble(const toda3_params *params, double *x, size_t members, double h, size_t steps,

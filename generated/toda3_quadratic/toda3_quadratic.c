@@ -12,7 +12,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 74d2cb5e5a08f974b5887b4050ff736332675dea0d9d321b84139a352a09eff1
+ * body-sha256: 9ad14be817d8bfba13c653402c6287c25ae72d268f2a33d398d26770eff27f4c
  */
 #include "toda3_quadratic.h"
 
@@ -198,7 +198,7 @@ static void toda3_quadratic_fit(toda3_quadratic_memory *memory)
     memory->fitting = 1;
     ++memory->fits;
     memory->slow = 0;
-    memory->patience = memory->patience < 10000 ? 2 * memory->patience + 96 : 20000;
+    memory->patience = memory->patience < 10000 ? 2 * memory->patience + 1000 : 20000;
 }
 
 /* Take in the solved value: what took one iteration needs no better guess. */
@@ -526,6 +526,7 @@ static toda3_quadratic_status toda3_quadratic_set_step(toda3_quadratic_solver *s
     for (int stage = 0; stage < 1; ++stage)
         toda3_quadratic_prepare(&s->params, toda3_quadratic_fractions[stage] * h, s->coef[stage]);
     memset(s->memory, 0, sizeof s->memory);
+    for (int stage = 0; stage < 1; ++stage) s->memory[stage].patience = 1000;
     s->h = h;
     s->ready = 1;
     return toda3_quadratic_OK;

@@ -12,7 +12,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 39d01cc46219e3070c606327de187cd722908e37ae69dfed32ddfc5f6fa5f4d9
+ * body-sha256: 8c412512b525931c2df2f25f37491eec4939991ac4ff58f682d83f6c4a922c3a
  */
 #ifndef TODA3_QUADRATIC_H
 #define TODA3_QUADRATIC_H
@@ -80,7 +80,7 @@ toda3_quadratic_status toda3_quadratic_step(toda3_quadratic_solver *s, double h)
 /* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 toda3_quadratic_status toda3_quadratic_integrate(toda3_quadratic_solver *s, double h, size_t steps);
 
-/* Many members, each integrated by itself, in place: x[i * members + m] is coordinate i of member m.
+/* Many members, in place: x[i * members + m] is coordinate i of member m. Each is integrated by itself.
    status (or NULL) receives the status of each member; a failed member keeps its last good state.
    Returns the first status that is not OK. */
 toda3_quadratic_status toda3_quadratic_ensemble(const toda3_quadratic_params *params, double *x,

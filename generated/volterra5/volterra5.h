@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: fe72ce3c6d4115375a35a8ca821518b5dfb7cc9c8bd2f4aceb03319fb5bf43b0
+ * body-sha256: c960cdd8fa253e23738fa46463ca400fef3a85c014b650bfd348a98f202252aa
  */
 #ifndef VOLTERRA5_H
 #define VOLTERRA5_H
@@ -87,7 +87,8 @@ volterra5_status volterra5_step(volterra5_solver *s, double h);
 /* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 volterra5_status volterra5_integrate(volterra5_solver *s, double h, size_t steps);
 
-/* Many members, each integrated by itself, in place: x[i * members + m] is coordinate i of member m.
+/* Many members, in place: x[i * members + m] is coordinate i of member m. 8 are integrated
+   side by side, and with OpenMP such groups in parallel.
    status (or NULL) receives the status of each member; a failed member keeps its last good state.
    Returns the first status that is not OK. */
 volterra5_status volterra5_ensemble(const volterra5_params *params, double *x, size_t members, double h,

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 1aa7aae4a7d3ed33c4813e41443b5906471dae733433ba0b4175d9f45ae8bba9
+ * body-sha256: e9bb316d73b3bc4014e5ae10f2f70752719dcc33403741dfbf7fdc0ffac046f6
  */
 #ifndef VORTICES3_H
 #define VORTICES3_H
@@ -87,7 +87,8 @@ vortices3_status vortices3_step(vortices3_solver *s, double h);
 /* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 vortices3_status vortices3_integrate(vortices3_solver *s, double h, size_t steps);
 
-/* Many members, each integrated by itself, in place: x[i * members + m] is coordinate i of member m.
+/* Many members, in place: x[i * members + m] is coordinate i of member m. 8 are integrated
+   side by side, and with OpenMP such groups in parallel.
    status (or NULL) receives the status of each member; a failed member keeps its last good state.
    Returns the first status that is not OK. */
 vortices3_status vortices3_ensemble(const vortices3_params *params, double *x, size_t members, double h,

@@ -18,6 +18,9 @@ HISTORY = 8
 #: Past values that the fitted recurrence uses, and values that it is fitted to; less where the solver grows too large.
 WINDOW, FITTED, SMALLEST = 32, 96, 30
 
+#: Steps that a fit costs, about; with the recurrences for whole blocks, four times as many are saved in.
+REPAY = 1000
+
 #: Values that the history of a solver may hold in all.
 MOST_HISTORY = 8_000
 
@@ -95,6 +98,8 @@ def _memory_values(program: Program) -> dict[str, object]:
     return {
         "fitted": fitted,
         "kept": 2 * fitted,
+        "repay": REPAY,
+        "most_repay": 4 * REPAY,
         "window": 2 * (fitted * WINDOW // FITTED // 2),
         "ahead": ahead,
         "horizon": "the next values" if ahead > 1 else "the next value",

@@ -64,15 +64,31 @@ def values(program: Program) -> Mapping[str, object]:
         "each_lane": each_lane(program),
         "floor": "0.0" if program.relative else "1e-6",
         "passes": PASSES if vectorised(program) else PASSES_OF_CALLS,
+        "ensemble_how": f"{LANES} are integrated\n   side by side, and with OpenMP such groups in parallel."
+        if blocks(program)
+        else "Each is integrated by itself.",
         "block_members": _MEMBERS if blocks(program) else [],
+        **_members(program),
         "block_reset": _RESET if blocks(program) else [],
+    }
+
+
+def _members(program: Program) -> Mapping[str, object]:
+    """What is particular to each member of an ensemble: the gauge, where it is chosen at the start."""
+    gauges = len(program.gauge)
+    if not gauges:
+        return {"group_gauge": (), "group_join": (), "init_member": "init(&s, params, x)"}
+    return {
+        "group_gauge": [f"double gauge[{LANES}][{gauges}]; /* of each member */"],
+        "group_join": ["memcpy(group->gauge[lane], s.gauge, sizeof s.gauge);"],
+        "init_member": "init_gauge(&s, params, x, group->gauge[lane])",
     }
 
 
 def pieces(program: Program, values: Mapping[str, object]) -> list[str]:
     """`integrate` and `ensemble`, with what they need."""
     if not blocks(program):
-        return [render("c", "integrate.c", values), render("c", "ensemble.c", values)]
+        return [render("c", "integrate.c", values), render("c", "ensemble_members.c", values)]
     kernel = program.kernels["linearise"]
     ops = {e.op for e in topological(kernel.roots)}
     found = [render("c", "lanes.c", values)]
@@ -84,7 +100,8 @@ def pieces(program: Program, values: Mapping[str, object]) -> list[str]:
         found.append(render("c", "tabulate_unrolled.c", values))
     else:
         found.append(render("c", "tabulate.c", values))
-    templates = ("sizes", "chain", "block", "march", "block_step", "choose_guess", "integrate_blocks", "ensemble")
+    templates = ["sizes", "correct", "chain", "block", "march", "block_step", "choose_guess", "integrate_blocks"]
+    templates += ["group", "group_guess", "group_solve", "group_step", "group_run", "ensemble"]
     return found + [render("c", f"{template}.c", values) for template in templates]
 
 

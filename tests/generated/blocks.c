@@ -1,0 +1,179 @@
+/* Blocks of steps and groups of members against single steps, from inside the generated file.
+   Compile with -DNAME=… -DSOURCE="…" -DSTEP=…, -DULPS=…, -DSTATE="…" (initial values separated by commas). */
+#include <stdio.h>
+#include <stdlib.h>
+
+#include SOURCE
+
+#define GLUE2(a, b) a##_##b
+#define GLUE(a, b) GLUE2(a, b)
+#define F(name) GLUE(NAME, name)
+#define DIM F(DIM)
+#define STAGES ((int)(sizeof F(fractions) / sizeof F(fractions)[0]))
+#define MEMBERS 11
+
+#define EXPECT(condition) \
+    do { \
+        if (!(condition)) { \
+            fprintf(stderr, "%s:%d: %s\n", __FILE__, __LINE__, #condition); \
+            exit(1); \
+        } \
+    } while (0)
+
+static const double start[DIM] = { STATE };
+
+static int close_to(const double *a, const double *b, double tolerance)
+{
+    double size = 0.0, apart = 0.0;
+    for (int i = 0; i < DIM; ++i) {
+        size = fmax(size, fabs(b[i]));
+        apart = fmax(apart, fabs(a[i] - b[i]));
+    }
+    return apart <= tolerance * size;
+}
+
+static void singly(F(solver) *s, int steps)
+{
+    for (int k = 0; k < steps; ++k) EXPECT(F(step)(s, STEP) == F(OK));
+}
+
+static void begin(F(solver) *s, int steps)
+{
+    EXPECT(F(init)(s, NULL, start) == F(OK));
+    singly(s, steps);
+}
+
+/* A block after some single steps, guessed in either way, moves the state as eight single steps do. */
+static void block_equals_steps(int steps, int foreseeing)
+{
+    static F(solver) together, singles, before;
+    static F(table) table;
+    begin(&together, steps);
+    for (int stage = 0; stage < STAGES && foreseeing; ++stage) F(fit)(&together.memory[stage]);
+    together.foreseeing = foreseeing;
+    for (int stage = 0; stage < STAGES; ++stage) table.fits[stage] = -1;
+    F(tell)(&together, &table);
+    singles = before = together;
+    if (F(block)(&together, &table, 1) == 0) { /* as a rule one pass is too few for a march by Runge-Kutta */
+        EXPECT(memcmp(together.x, before.x, sizeof before.x) == 0);
+        EXPECT(memcmp(together.carry, before.carry, sizeof before.carry) == 0);
+        EXPECT(together.steps == before.steps);
+    }
+    together = before;
+    const int passes = F(block)(&together, &table, 8);
+    singly(&singles, F(LANES));
+    EXPECT(passes > 0);
+    EXPECT(passes <= (foreseeing ? 3 : 4));
+    EXPECT(together.steps == singles.steps);
+    EXPECT(close_to(together.x, singles.x, 1e-13));
+    for (int stage = 0; stage < STAGES; ++stage) {
+        const F(memory) *a = &together.memory[stage], *b = &singles.memory[stage];
+        EXPECT(a->count == b->count);
+        for (int k = 1; k <= F(LANES); ++k) EXPECT(close_to(a->past[a->count - k], b->past[b->count - k], 1e-9));
+    }
+}
+
+/* The state and what rounding took from it, together: that is below the last place, unless the sum is not compensated. */
+static void integrate_equals_steps(int steps)
+{
+    static F(solver) together, singles;
+    double size = 0.0, apart = 0.0;
+    begin(&singles, steps);
+    EXPECT(F(init)(&together, NULL, start) == F(OK));
+    EXPECT(F(integrate)(&together, STEP, (size_t)steps) == F(OK));
+    EXPECT(together.steps == singles.steps);
+    for (int i = 0; i < DIM; ++i) {
+        size = fmax(size, fabs(singles.x[i]));
+        apart = fmax(apart, fabs((together.x[i] - singles.x[i]) + (together.carry[i] - singles.carry[i])));
+    }
+    EXPECT(apart <= ULPS * 0.5 * DBL_EPSILON * size);
+}
+
+/* Members of one group, with extrapolated guesses and then with fitted ones, and one lane empty. */
+static void group_equals_steps(int steps)
+{
+    static F(group) group;
+    static F(solver) singles;
+    double x[DIM], end[DIM];
+    memset(&group, 0, sizeof group);
+    for (int lane = 0; lane < F(LANES); ++lane) {
+        for (int i = 0; i < DIM; ++i) x[i] = start[i] * (1.0 + 1e-3 * lane);
+        if (lane != 3) EXPECT(F(group_join)(&group, lane, NULL, x, STEP) == F(OK));
+        group.left[lane] = (size_t)steps;
+    }
+    for (int k = 0; k < steps; ++k) EXPECT(F(group_step)(&group) == F(LANES) - 1);
+    for (int lane = 0; lane < F(LANES); ++lane) {
+        if (lane == 3) continue;
+        for (int i = 0; i < DIM; ++i) x[i] = start[i] * (1.0 + 1e-3 * lane);
+        EXPECT(group.left[lane] == 0);
+        EXPECT(F(init)(&singles, NULL, x) == F(OK));
+        singly(&singles, steps);
+        for (int i = 0; i < DIM; ++i) end[i] = group.x[i][lane];
+        EXPECT(close_to(end, singles.x, 1e-12));
+    }
+}
+
+/* Both guesses are near the next values: extrapolation nearer than the last ones are, recurrences nearer still. */
+static void group_fits(void)
+{
+    static F(group) group;
+    enum { ROWS = (int)(sizeof group.past[0] / sizeof group.past[0][0]) };
+    F(lanes) guess[DIM], rough[DIM], last[DIM];
+    double apart = 0.0, moved = 0.0, a[DIM], b[DIM];
+    memset(&group, 0, sizeof group);
+    group.patience = 1 << 30;
+    for (int lane = 0; lane < F(LANES); ++lane) EXPECT(F(group_join)(&group, lane, NULL, start, STEP) == F(OK));
+    for (int lane = 0; lane < F(LANES); ++lane) group.left[lane] = ROWS + 1;
+    for (int k = 0; k < ROWS; ++k) F(group_step)(&group);
+    F(group_fit)(&group);
+    F(group_foresee)(&group, 0, guess);
+    F(group_extrapolate)(&group, 0, rough);
+    memcpy(last, group.past[0][group.latest], sizeof last);
+    F(group_step)(&group);
+    for (int lane = 0; lane < F(LANES); ++lane) {
+        for (int i = 0; i < DIM; ++i) a[i] = guess[i][lane];
+        for (int i = 0; i < DIM; ++i) b[i] = group.past[0][group.latest][i][lane];
+        EXPECT(close_to(a, b, 1e-3));
+        for (int i = 0; i < DIM; ++i) {
+            apart += fabs(rough[i][lane] - b[i]);
+            moved += fabs(last[i][lane] - b[i]);
+        }
+    }
+    EXPECT(apart <= 0.3 * moved);
+}
+
+/* The whole ensemble, the last group of which is not full; a member without a state is said to be so. */
+static void ensemble_equals_steps(int steps)
+{
+    static F(solver) singles;
+    static double x[DIM * MEMBERS];
+    double x0[DIM], end[DIM];
+    unsigned char status[MEMBERS];
+    for (int m = 0; m < MEMBERS; ++m)
+        for (int i = 0; i < DIM; ++i) x[i * MEMBERS + m] = start[i] * (1.0 + 1e-3 * m);
+    x[5] = nan("");
+    EXPECT(F(ensemble)(NULL, x, MEMBERS, STEP, (size_t)steps, status) == F(BAD_ARGUMENT));
+    for (int m = 0; m < MEMBERS; ++m) {
+        EXPECT(status[m] == (m == 5 ? F(BAD_ARGUMENT) : F(OK)));
+        if (m == 5) continue;
+        for (int i = 0; i < DIM; ++i) x0[i] = start[i] * (1.0 + 1e-3 * m);
+        EXPECT(F(init)(&singles, NULL, x0) == F(OK));
+        singly(&singles, steps);
+        for (int i = 0; i < DIM; ++i) end[i] = x[i * MEMBERS + m];
+        EXPECT(close_to(end, singles.x, 1e-12));
+    }
+}
+
+int main(void)
+{
+    block_equals_steps(1, 0);
+    block_equals_steps(30, 0);
+    block_equals_steps(200, 1);
+    integrate_equals_steps(1);
+    integrate_equals_steps(7);
+    integrate_equals_steps(301);
+    group_equals_steps(150);
+    group_fits();
+    ensemble_equals_steps(40);
+    return 0;
+}

@@ -1,0 +1,43 @@
+"""Blocks of steps and groups of members do what single steps do, to round-off."""
+
+from pathlib import Path
+
+import pytest
+from support import COMMAND, NAMES, compiled, run, setting, tool, write
+
+from phigen.compiler import emit
+from phigen.targets.c import lanes
+
+#: Where 300 steps multiply round-off. Elsewhere blocks and single steps agree to one unit of the last place.
+GROWING = {"gaussian_moments", "henon_heiles", "kowalevski_top", "pendulum"}
+
+EXERCISE = Path(__file__).with_name("blocks.c")
+
+
+@pytest.mark.parametrize("name", [n for n in NAMES if lanes.blocks(compiled(n).program)])
+def test_blocks_and_groups_equal_single_steps(name, tmp_path):
+    exercise(compiled(name), "-O1", tmp_path)
+
+
+@pytest.mark.parametrize("name", ["rigid_body", "volterra5", "toda3", "kowalevski_top"])
+def test_vectorised_blocks_and_groups_equal_single_steps(name, tmp_path):
+    """-O1 leaves the loops over lanes as they are, -O3 makes vector instructions of them."""
+    exercise(compiled(name), "-O3", tmp_path)
+
+
+@pytest.mark.parametrize("name", ["rigid_body", "volterra5"])
+def test_blocks_of_several_stages_equal_single_steps(name, tmp_path):
+    exercise(compiled(name, 4, "composition"), "-O2", tmp_path)
+
+
+def exercise(compilation, optimisation, folder):
+    """Build and run blocks.c for a system."""
+    name = compilation.program.name
+    write(folder, emit(compilation.program, "c", COMMAND, single_file=True))
+    at = setting(compilation)
+    definitions = [f"-DNAME={name}", f'-DSOURCE="{name}.c"', f"-DSTEP={at.h!r}"]
+    definitions.append(f"-DULPS={20 if name in GROWING else 1}")
+    definitions.append("-DSTATE=" + ", ".join(map(repr, at.x)))
+    flags = ["-std=c99", optimisation, "-Wall", "-Wextra", "-Werror", "-Wno-unused-function"]
+    run([tool("gcc"), *flags, *definitions, "-I.", EXERCISE, "-o", "blocks", "-lm"], folder)
+    run([folder / "blocks"], folder)
