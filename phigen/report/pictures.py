@@ -98,7 +98,10 @@ def work_picture(study: Study) -> Markup:
 def _picture(identifier: str, figure: Figure, title: str, description: str, caption: str) -> Markup:
     image = inlined(figures.svg(figure), identifier, title, description)
     kind = "wide" if figure.get_figwidth() > figures.NARROW else ""
-    return page.block("figure", identifier=f"figure-{identifier}", kind=kind, image=image, caption=caption)
+    tabindex = "0" if kind else "-1"  # what is wider than the page scrolls, by the keyboard too
+    return page.block(
+        "figure", identifier=f"figure-{identifier}", kind=kind, tabindex=tabindex, image=image, caption=caption
+    )
 
 
 def _described(s: Summary) -> str:
