@@ -104,20 +104,12 @@ def _opening(
 
 def _with_constancy(material: Material, experiment: Experiment) -> Material:
     """With the constancy of the modified Hamiltonian, or why it was not measured."""
-    import numpy as np
+    from phigen.analysis.backward import NotOfferedError
+    from phigen.cli.verify import constancy_of
 
-    from phigen.analysis import backward
-    from phigen.analysis.methods import of_solver
-    from phigen.analysis.verification import gauge_at
-    from phigen.api import chosen_target, solver_of
-
-    compilation, parameters, x0 = material.compilation, experiment.parameters, np.array(experiment.initial)
     try:
-        gauge = gauge_at(compilation, x0, parameters)
-        found = backward.modified(compilation, parameters, gauge)
-        method = of_solver(solver_of(compilation, chosen_target("auto")), parameters, gauge)
-        return replace(material, constancy=backward.constancy(found, method, x0, experiment.h))
-    except backward.NotOfferedError as error:
+        return replace(material, constancy=constancy_of(material.compilation, experiment))
+    except NotOfferedError as error:
         return replace(material, no_constancy=str(error))
     except StepError as error:
         return replace(material, no_constancy=f"a step failed: {error}")

@@ -12,25 +12,13 @@ from phigen.cli.console import Console, out, pass_console, verbosity
 from phigen.cli.experiment import loaded, prepared
 from phigen.cli.interruption import InterruptedRunError
 from phigen.cli.run_summary import described_run, finite, print_summary
-from phigen.cli.sources import ORDER, load_one, one_spec, scheme_option
+from phigen.cli.sources import FIGURES, ORDER, file_ending, load_one, one_spec, scheme_option
 
 if TYPE_CHECKING:
     from phigen.cli.recording import Recorder
     from phigen.runtime.trajectory import Trajectory
 
 _TABLES = (".csv", ".npz")
-_FIGURES = (".png", ".svg", ".pdf")
-
-
-def _file(*suffixes: str) -> Any:
-    """Checks the suffix of a file, before any work is done."""
-
-    def checked(ctx: click.Context, parameter: click.Parameter, value: str | None) -> Path | None:
-        if value is not None and Path(value).suffix.lower() not in suffixes:
-            raise click.BadParameter(f"{value!r} must end in {' or '.join(suffixes)}")
-        return Path(value) if value is not None else None
-
-    return checked
 
 
 @click.command("run")
@@ -43,11 +31,13 @@ def _file(*suffixes: str) -> Any:
 @click.option("--steps", type=click.IntRange(min=1), help="Number of steps, instead of the run's.")
 @click.option("--set", "settings", metavar="NAME=VALUE", multiple=True, help="A parameter, or an initial coordinate.")
 @click.option(
-    "-o", "--output", metavar="FILE", callback=_file(*_TABLES), help="Store the trajectory: FILE.csv or FILE.npz."
+    "-o", "--output", metavar="FILE", callback=file_ending(*_TABLES), help="Store the trajectory: FILE.csv or FILE.npz."
 )
-@click.option("--section", metavar="FILE", callback=_file(*_TABLES),
+@click.option("--section", metavar="FILE", callback=file_ending(*_TABLES),
               help="Store the crossings of the run's Poincaré section: FILE.csv or FILE.npz.")  # fmt: skip
-@click.option("--plot", metavar="FILE", callback=_file(*_FIGURES), help="Draw the run: FILE.png, FILE.svg or FILE.pdf.")
+@click.option(
+    "--plot", metavar="FILE", callback=file_ending(*FIGURES), help="Draw the run: FILE.png, FILE.svg or FILE.pdf."
+)
 @click.option("--lyapunov", is_flag=True, help="Lyapunov exponents, through the exact derivative of each step.")
 @click.option("--resume", is_flag=True, help="Go on with an interrupted run that was writing the same files.")
 @click.option("--json", "as_json", is_flag=True, help="The summary for machines.")

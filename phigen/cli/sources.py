@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,6 +19,9 @@ if TYPE_CHECKING:
 
 SUFFIXES = (".yaml", ".yml")
 
+#: What files of figures end in.
+FIGURES = (".png", ".svg", ".pdf")
+
 #: The type of ``--order``.
 ORDER = click.IntRange(1, limits.ORDER)
 
@@ -32,6 +35,17 @@ scheme_option = click.option(
 
 one_spec = click.argument("spec_file", metavar="SPEC", type=click.Path())
 many_specs = click.argument("spec_files", metavar="SPEC...", nargs=-1, required=True, type=click.Path())
+
+
+def file_ending(*suffixes: str) -> Callable[[click.Context, click.Parameter, str | None], Path | None]:
+    """The callback of an option that names a file: checks its suffix before any work is done."""
+
+    def checked(ctx: click.Context, parameter: click.Parameter, value: str | None) -> Path | None:
+        if value is not None and Path(value).suffix.lower() not in suffixes:
+            raise click.BadParameter(f"{value!r} must end in {' or '.join(suffixes)}")
+        return Path(value) if value is not None else None
+
+    return checked
 
 
 def load_one(path: str) -> Spec:

@@ -6,16 +6,19 @@ import json
 import math
 from collections.abc import Sequence
 from dataclasses import asdict
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from phigen.cli.console import Console, heading, out, pass_console, table, verbosity
+from phigen.cli.experiment import Experiment, prepared
 from phigen.cli.failures import Collector
-from phigen.cli.sources import ORDER, load_all, many_specs, scheme_option
-from phigen.errors import CheckError
+from phigen.cli.sources import FIGURES, ORDER, file_ending, load_all, many_specs, scheme_option
+from phigen.errors import CheckError, StepError
 
 if TYPE_CHECKING:
+    from phigen.analysis.backward import Constancy
     from phigen.analysis.verification import Check, Verification
     from phigen.compiler import Compilation
     from phigen.spec.model import Spec
@@ -29,6 +32,8 @@ _NOT_FINITE = {math.inf: "∞", -math.inf: "-∞"}
 @click.option("--order", type=ORDER, help="Order of the method, instead of the spec's.")
 @scheme_option
 @click.option("--quick", is_flag=True, help="Fewer steps.")
+@click.option("--plot", metavar="FILE", callback=file_ending(*FIGURES),
+              help="Draw the constancy of one modified Hamiltonian: FILE.png, FILE.svg or FILE.pdf.")  # fmt: skip
 @click.option("--json", "as_json", is_flag=True, help="For machines: one object per spec.")
 @verbosity
 @pass_console
@@ -39,6 +44,7 @@ def command(
     order: int | None,
     scheme: str | None,
     quick: bool,
+    plot: Path | None,
     as_json: bool,
 ) -> None:
     """Build every target of specs and measure what the solvers promise.
@@ -50,7 +56,14 @@ def command(
     from phigen.analysis.proof import compile_proved
 
     collector, found = Collector(), []
-    for spec in load_all(spec_files, collector):
+    specs = load_all(spec_files, collector)
+    if plot:
+        from phigen.analysis.drawing.palette import require_matplotlib
+
+        require_matplotlib()
+        if len(specs) > 1:
+            raise click.BadParameter(f"one spec is drawn, not {len(specs)}", param_hint="--plot")
+    for spec in specs:
         with collector.collecting():
             extras = with_tangent(spec)
             compilation = compile_proved(spec, order=order, scheme=scheme, extras=extras)
@@ -58,11 +71,41 @@ def command(
             found.append(verification)
             if not as_json:
                 print_table(verification)
+            if plot:
+                _draw(plot, compilation, prepared(spec, name), console)
             if verification.failures:
                 collector.errors.append(fallen_short(verification))
     if as_json:
         out(json.dumps([described(v) for v in found], indent=2, ensure_ascii=False))
     collector.finish()
+
+
+def _draw(path: Path, compilation: Compilation, experiment: Experiment, console: Console) -> None:
+    from phigen.analysis import figures
+    from phigen.analysis.backward import NotOfferedError
+
+    try:
+        figures.save(figures.constancy_figure(constancy_of(compilation, experiment)), path)
+    except (NotOfferedError, StepError) as error:
+        console.warn(f"{compilation.spec.name}: the modified Hamiltonian cannot be drawn: {error}")
+        return
+    console.note(f"wrote {path}")
+
+
+def constancy_of(compilation: Compilation, experiment: Experiment) -> Constancy:
+    """How constant the modified Hamiltonian is on a run. Raises `NotOfferedError` and `StepError`."""
+    import numpy as np
+
+    from phigen.analysis import backward
+    from phigen.analysis.methods import of_solver
+    from phigen.analysis.verification import gauge_at
+    from phigen.api import chosen_target, solver_of
+
+    parameters, x0 = experiment.parameters, np.array(experiment.initial)
+    gauge = gauge_at(compilation, x0, parameters)
+    found = backward.modified(compilation, parameters, gauge)
+    method = of_solver(solver_of(compilation, chosen_target("auto")), parameters, gauge)
+    return backward.constancy(found, method, x0, experiment.h)
 
 
 def with_tangent(spec: Spec) -> Any:
@@ -78,7 +121,6 @@ def verified(
     """The verification of a compilation with its tangent map on a run of its spec; of the spec's targets by default."""
     from phigen.analysis.verification import verify
     from phigen.api import solver_of
-    from phigen.cli.experiment import prepared
 
     spec = compilation.spec
     experiment = prepared(spec, name)

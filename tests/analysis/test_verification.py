@@ -218,3 +218,20 @@ def test_every_row_has_a_meaning_which_the_documentation_gives(name):
         meaning = meaning_of(check.name)
         assert f"| {meaning.row} | {meaning.measures} | {meaning.failure or '–'} |" in page
         assert meaning.failure or not check.limit, check.name
+
+
+def test_command_draws_the_modified_hamiltonian_of_one_spec(tmp_path):
+    (tmp_path / "a.yaml").write_text(TEXT, encoding="utf-8")
+    (tmp_path / "b.yaml").write_text(TEXT.replace("name: t", "name: b"), encoding="utf-8")
+    picture = tmp_path / "a.svg"
+
+    def verify(*files):
+        names = [str(tmp_path / file) for file in files]
+        return CliRunner().invoke(group, ["verify", "--quick", "--plot", str(picture), *names])
+
+    assert verify("a.yaml", "b.yaml").exit_code == 2
+    assert not picture.exists()
+    done = verify("a.yaml")
+    assert done.exit_code == 0
+    assert picture.read_text(encoding="utf-8").count("<path") > 10
+    assert f"wrote {picture}" in done.stderr
