@@ -92,7 +92,7 @@ def readable(expressions: Sequence[Expression], most: int | None = SHOWN) -> lis
     """The expressions as text, expanded where that is shorter; covectors are written ``p_NAME``."""
     shown = with_plain_names(expressions)
     forms = expanded(shown, most)
-    plain = [_infix(e) if len(topological([e])) <= _LARGE else text(e) for e in shown]
+    plain = [_written(e) for e in shown]
     return [min((str(f), t), key=len) if f else t for f, t in zip(forms, plain, strict=True)]
 
 
@@ -101,6 +101,10 @@ def readable_latex(expressions: Sequence[Expression]) -> list[str]:
     shown = with_plain_names(expressions)
     forms = [[latex(e), *([f.latex()] if f else [])] for f, e in zip(expanded(shown, None), shown, strict=True)]
     return [min(form, key=len) for form in forms]
+
+
+def _written(e: Expression) -> str:
+    return _infix(e) if len(topological([e])) <= _LARGE else text(e)
 
 
 def _infix(e: Expression) -> str:
@@ -184,4 +188,4 @@ def _monomial(factors: Monomial) -> str:
 
 
 def _atom(e: Expression) -> str:
-    return f"({text(e)})" if e.op in ("add", "sub", "neg", "mul") else text(e)
+    return f"({_written(e)})" if e.op in ("add", "sub", "neg", "mul") else _written(e)

@@ -5,6 +5,8 @@ from __future__ import annotations
 from phigen.analysis.formulas import Formula, of_polynomial
 from phigen.analysis.proof import stage_order
 from phigen.compiler import Compilation
+from phigen.errors import Diagnostic, SpecError
+from phigen.scheme.modified import corrections, expect_modified, powers
 
 #: The leading term of the modified Hamiltonian costs one more coefficient of the series; beyond this it is left out.
 _MODIFIED_UP_TO = 6
@@ -31,3 +33,21 @@ def series_formulas(compilation: Compilation, most: int | None) -> tuple[list[tu
     series = compilation.series(plan.order + 1 if more else plan.terms)
     listed = [(i, of_polynomial(series.tower, s, most)) for i, s in enumerate(series.terms[: plan.terms], 1) if s != 0]
     return listed, of_polynomial(series.tower, -series.terms[plan.order], most) if more else None
+
+
+def modified_formulas(compilation: Compilation, count: int, most: int | None) -> list[tuple[int, Formula]]:
+    """The first ``count`` terms h^j H_j of the modified Hamiltonian H̃ = H + h^p H_p + …, as pairs of j and H_j.
+
+    With a count of 0 the leading one, where it costs little. Raises `SpecError` for a splitting, a composition and an
+    approximate bi-realisation if more are asked for.
+    """
+    if not count:
+        leading = None if compilation.splitting else series_formulas(compilation, most)[1]
+        return [] if leading is None else [(compilation.order.order, leading)]
+    if compilation.splitting:
+        raise SpecError([Diagnostic("the modified Hamiltonian is not computed for a splitting")])
+    system, chart = compilation.system, compilation.chart
+    expect_modified(system, chart, len(compilation.program.fractions))
+    found = corrections(system, chart, compilation.order, count, compilation.gauge)
+    listed = powers(compilation.order, count, symmetric=chart.symmetric)
+    return [(j, of_polynomial(found.tower, found.terms[j], most)) for j in listed]

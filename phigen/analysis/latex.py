@@ -5,15 +5,22 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from phigen.analysis.flows import images
-from phigen.analysis.formulas import SHOWN, latex, of_polynomial, readable_latex
-from phigen.analysis.proof import stage_order
+from phigen.analysis.formulas import SHOWN, latex, readable_latex
+from phigen.analysis.generating import modified_formulas, series_formulas
 from phigen.compiler import Compilation
 from phigen.splitting.flow import Flow
 from phigen.symbolic.expression import symbol
 
+#: The function φ of the exponential bi-realisation.
+PHI = ("\\varphi(s)", r"\frac{1}{s} \left( 1 - \frac{\sqrt{s}}{2} \cot \frac{\sqrt{s}}{2} \right)")
 
-def document(compilation: Compilation, *, full: bool = False) -> str:
-    """Equations for π, H, the Casimirs, α, β and S_1 … S_k; long S_i abbreviated unless ``full``."""
+
+def document(compilation: Compilation, modified: int = 0, most: int | None = SHOWN) -> str:
+    """Equations for π, H, the Casimirs, α, β, S_1 … S_k, or the parts and flows of a splitting, and H̃.
+
+    ``most`` bounds the terms shown of S_i and H̃; None shows all. ``modified`` is the number of corrections of H̃; with 0,
+    the leading one is shown where it costs little. Raises `SpecError` where they are asked for and not computed.
+    """
     system = compilation.system
     names = [latex(symbol(c)) for c in system.coordinates]
     blocks = [
@@ -27,10 +34,10 @@ def document(compilation: Compilation, *, full: bool = False) -> str:
     if compilation.splitting:
         blocks += [_flow(flow, k, system.coordinates) for k, flow in enumerate(compilation.splitting.flows, 1)]
     else:
-        realisation = compilation.chart
-        for greek, maps in (("\\alpha", realisation.alpha), ("\\beta", realisation.beta)):
-            blocks.append(_aligned(zip_names([f"{greek}_{{{n}}}" for n in names], readable_latex(maps))))
-        blocks.append(_aligned(_series(compilation, None if full else SHOWN)))
+        blocks += [*_maps(compilation, names), _aligned(_series(compilation, most))]
+    if listed := modified_formulas(compilation, modified, most):
+        sums = " + ".join(["H", *(f"{_power(j)} H_{{{j}}}" for j, _ in listed), "\\cdots"])
+        blocks.append(_aligned([("\\tilde{H}", sums), *((f"H_{{{j}}}", f.latex()) for j, f in listed)]))
     return "\n".join([f"% {compilation.spec.name}, order {compilation.order.order}; needs amsmath", *blocks])
 
 
@@ -42,11 +49,36 @@ def _flow(flow: Flow, k: int, coordinates: Sequence[str]) -> str:
     return _aligned([(f"H_{{{k}}}", hamiltonian), *zip_names([f"\\Phi_{{{k}}}^* {n}" for n in names], texts)])
 
 
+def _maps(compilation: Compilation, names: Sequence[str]) -> list[str]:
+    """α and β, and φ if they contain it; of a path they are series, of which this is the beginning."""
+    realisation = compilation.chart
+    more = " + \\cdots" if realisation.path else ""
+    blocks = []
+    for greek, maps in (("\\alpha", realisation.alpha), ("\\beta", realisation.beta)):
+        texts = [t + more for t in readable_latex(maps)]
+        blocks.append(_aligned(zip_names([f"{greek}_{{{n}}}" for n in names], texts)))
+    return [*blocks, _aligned([PHI])] if any("\\varphi" in block for block in blocks) else blocks
+
+
+def _gauged(compilation: Compilation) -> str:
+    """The Hamiltonian that the series is of, if Casimirs are subtracted, to stand before what S_1 is."""
+    gauge = compilation.gauge
+    factors = readable_latex([symbol(s) for s in gauge.symbols])
+    factors += [f"\\left( {value} \\right)" for value in readable_latex([*gauge.fixed.values()])]
+    casimirs = [latex(symbol(name)) for name in (*gauge.free, *gauge.fixed)]
+    parts = [f" - {factor} {casimir}" for factor, casimir in zip(factors, casimirs, strict=True)]
+    return "".join(["H", *parts, " = "]) if parts else ""
+
+
 def _series(compilation: Compilation, most: int | None) -> list[tuple[str, str]]:
-    series = compilation.series(stage_order(compilation).terms)
-    return [
-        (f"S_{{{i}}}", of_polynomial(series.tower, s, most).latex()) for i, s in enumerate(series.terms, 1) if s != 0
-    ]
+    listed, _ = series_formulas(compilation, most)
+    total = " + ".join(f"{_power(i)} S_{{{i}}}" for i, _ in listed)
+    texts = [_gauged(compilation) * (i == 1) + f.latex() for i, f in listed]
+    return [("S_h", total), *zip_names([f"S_{{{i}}}" for i, _ in listed], texts)]
+
+
+def _power(exponent: int) -> str:
+    return f"h^{{{exponent}}}" if exponent > 1 else "h"
 
 
 def zip_names(names: Sequence[str], texts: Sequence[str]) -> list[tuple[str, str]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import textwrap
+import unicodedata
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +12,6 @@ import click
 
 from phigen.cli.console import heading, out, verbosity
 from phigen.cli.sources import CORRECTIONS, ORDER, load_one, one_spec, scheme_option
-from phigen.errors import Diagnostic, SpecError
 
 if TYPE_CHECKING:
     from phigen.compiler import Compilation
@@ -45,22 +45,19 @@ def command(
     if as_latex:
         from phigen.analysis.latex import document
 
-        out(document(compilation, full=full))
+        out(document(compilation, modified, None if full else SHOWN))
     elif as_json:
-        corrections = {"corrections": dict(modified_formulas(compilation, modified, None))} if modified else {}
+        corrections = {"corrections": dict(_modified(compilation, modified, None))} if modified else {}
         out(json.dumps({**_described(compilation), **corrections}, indent=2, ensure_ascii=False))
     else:
-        _print(compilation, None if full else SHOWN)
-        if modified:
-            _section(
-                "Modified Hamiltonian", _assignments(modified_formulas(compilation, modified, None if full else SHOWN))
-            )
+        _print(compilation, modified, None if full else SHOWN)
 
 
-def _print(compilation: Compilation, most: int | None) -> None:
+def _print(compilation: Compilation, modified: int, most: int | None) -> None:
     from phigen.analysis import flows
 
     spec, system = compilation.spec, compilation.system
+    corrected = _modified(compilation, modified, most)
     out(heading(f"{spec.name}: {spec.title}" if spec.title else spec.name))
     if system.parameters:
         listed = ", ".join(f"{p.name} = {float(p.value):.9g}" + (" > 0" * p.positive) for p in system.parameters)
@@ -75,6 +72,8 @@ def _print(compilation: Compilation, most: int | None) -> None:
         _section(f"Splitting: {flows.method(compilation)}", _assignments(flows.formulas(compilation, most)))
     else:
         _print_series(compilation, most)
+    if corrected:
+        _section("Modified Hamiltonian", _assignments(corrected))
     _section("Generated code", _code(compilation))
 
 
@@ -83,10 +82,11 @@ def _print_series(compilation: Compilation, most: int | None) -> None:
 
     why = textwrap.wrap(compilation.chart.explanation, 100)
     maps = _assignments(_maps(compilation, most))
-    if any("φ(" in line for line in maps):
+    if any("φ" in line for line in maps):
         maps.append("where φ(s) = (1 − (√s/2) cot(√s/2))/s = 1/12 + s/720 + …")
     _section(f"Bi-realisation: {compilation.chart.kind}", [*why, *maps])
-    _section(f"Generating function: {generating.method(compilation)}", _assignments(_series(compilation, most)))
+    series = [*_gauged(compilation), *_assignments(_series(compilation, most))]
+    _section(f"Generating function: {generating.method(compilation)}", series)
 
 
 def _section(title: str, lines: Sequence[str]) -> None:
@@ -96,8 +96,13 @@ def _section(title: str, lines: Sequence[str]) -> None:
 
 
 def _assignments(pairs: Sequence[tuple[str, str]]) -> list[str]:
-    width = max((len(name) for name, _ in pairs), default=0)
-    return [f"{name:<{width}} = {value}" for name, value in pairs]
+    width = max((_width(name) for name, _ in pairs), default=0)
+    return [f"{name}{' ' * (width - _width(name))} = {value}" for name, value in pairs]
+
+
+def _width(name: str) -> int:
+    """Columns on a terminal: the tilde of H̃ takes none."""
+    return sum(not unicodedata.combining(c) for c in name)
 
 
 def brackets(compilation: Compilation) -> list[tuple[str, str]]:
@@ -123,52 +128,42 @@ def _named(formulas: Any, most: int | None) -> list[tuple[str, str]]:
 
 
 def _maps(compilation: Compilation, most: int | None) -> list[tuple[str, str]]:
-    """α and β; of a symmetric pair, α alone and what β is."""
+    """α and β, of a symmetric pair α alone and what β is; of a path they are series, of which this is the beginning."""
     from phigen.analysis.formulas import readable
 
     realisation, names = compilation.chart, compilation.system.coordinates
-    result = [(f"α_{c}", t) for c, t in zip(names, readable(realisation.alpha, most), strict=True)]
+    more = " + …" if realisation.path else ""
+    result = [(f"α_{c}", t + more) for c, t in zip(names, readable(realisation.alpha, most), strict=True)]
     if realisation.symmetric:
         return [*result, ("β(x, p)", "α(x, −p)")]
-    return result + [(f"β_{c}", t) for c, t in zip(names, readable(realisation.beta, most), strict=True)]
+    return result + [(f"β_{c}", t + more) for c, t in zip(names, readable(realisation.beta, most), strict=True)]
 
 
-def modified_formulas(compilation: Compilation, count: int, most: int | None) -> list[tuple[str, str]]:
-    """H̃ = H + h^p H_p + …, and its first corrections; a gauge is that of the section before.
+def _modified(compilation: Compilation, count: int, most: int | None) -> list[tuple[str, str]]:
+    """H̃ = H + h^p H_p + …, and its first corrections."""
+    from phigen.analysis.generating import modified_formulas
 
-    Raises `SpecError` for a composition and for an approximate bi-realisation.
-    """
-    from phigen.analysis.formulas import of_polynomial
-    from phigen.scheme.modified import corrections, expect_modified, powers
+    listed = modified_formulas(compilation, count, most)
+    names = ["H", *(f"{_power(j)} H_{j}" for j, _ in listed), "…"]
+    return [("H̃", " + ".join(names)), *((f"H_{j}", str(f)) for j, f in listed)] if listed else []
 
-    if compilation.splitting:
-        raise SpecError([Diagnostic("the modified Hamiltonian is not computed for a splitting")])
-    program, realisation = compilation.program, compilation.chart
-    expect_modified(compilation.system, realisation, len(program.fractions))
-    found = corrections(compilation.system, realisation, compilation.order, count, compilation.gauge)
-    listed = powers(compilation.order, count, symmetric=realisation.symmetric)
-    names = ["H", *(f"h^{j} H_{j}" if j > 1 else "h H_1" for j in listed), "…"]
-    terms = [(f"H_{j}", str(of_polynomial(found.tower, found.terms[j], most))) for j in listed]
-    return [("H̃", " + ".join(names)), *terms]
+
+def _gauged(compilation: Compilation) -> list[str]:
+    """What H stands for in S_h, if Casimirs are subtracted."""
+    gauge = compilation.gauge
+    taken = [f"λ_{c} {c}" for c in gauge.free] + [f"({value}) {c}" for c, value in gauge.fixed.items()]
+    return [f"of H - {' - '.join(taken)}, which has the same flow as H"] if taken else []
 
 
 def _series(compilation: Compilation, most: int | None) -> list[tuple[str, str]]:
     from phigen.analysis.generating import series_formulas
 
-    listed, correction = series_formulas(compilation, most)
-    gauge = compilation.gauge
-    taken = [f"λ_{c} {c}" for c in gauge.free] + [f"({value}) {c}" for c, value in gauge.fixed.items()]
-    pairs = [("H", f"H - {' - '.join(taken)} in what follows")] if taken else []
-    pairs += [("S_h", " + ".join(f"h^{i} S_{i}" if i > 1 else "h S_1" for i, _ in listed))]
-    pairs += [(f"S_{i}", str(f)) for i, f in listed]
-    if correction is not None:
-        p = compilation.order.order
-        h = f"h^{p}" if p > 1 else "h"
-        if correction.size == 0:
-            pairs.append(("modified H", f"H, up to {h} at least"))
-        else:
-            pairs += [("modified H", f"H + {h} M + …"), ("M", str(correction))]
-    return pairs
+    listed, _ = series_formulas(compilation, most)
+    return [("S_h", " + ".join(f"{_power(i)} S_{i}" for i, _ in listed)), *((f"S_{i}", str(f)) for i, f in listed)]
+
+
+def _power(exponent: int) -> str:
+    return f"h^{exponent}" if exponent > 1 else "h"
 
 
 def _code(compilation: Compilation) -> list[str]:

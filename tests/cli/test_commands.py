@@ -125,6 +125,46 @@ def test_latex_is_balanced_and_complete(phigen, name):
     assert ":" not in latex
 
 
+def test_latex_defines_what_it_uses(phigen):
+    """λ of a gauge, φ of the exponential, and the modified Hamiltonian that was asked for."""
+    latex = phigen("show", SPECS / "rigid_body.yaml", "--latex", "--modified", "2").stdout
+    assert "\\varphi(s) &= \\frac{1}{s}" in latex
+    assert "S_{1} &= H - \\lambda_{C} C = " in latex
+    assert "\\tilde{H} &= H + h^{6} H_{6} + h^{8} H_{8} + \\cdots" in latex
+    assert latex.count("  H_{8} &= ") == 1
+
+
+def test_modified_hamiltonian_in_latex_is_refused_where_it_is_not_computed(phigen):
+    options = ("--scheme", "splitting", "--latex")
+    assert "H_{2} &= " in phigen("show", SPECS / "henon_heiles.yaml", *options).stdout
+    done = phigen("show", SPECS / "henon_heiles.yaml", *options, "--modified", "1")
+    assert (done.exit_code, done.stdout) == (1, "")
+    assert "not computed for a splitting" in done.stderr
+
+
+def test_show_names_each_correction_once(phigen):
+    """-S_3 of the untruncated series, or by the general algorithm: the same term under the same name."""
+    pages = [
+        phigen("show", SPECS / "lotka_volterra.yaml", "--order", "2", *m).stdout for m in ([], ["--modified", "1"])
+    ]
+    assert pages[0] == pages[1]
+    assert pages[0].count("  H_2 = (-x1**2*x2 ") == 1
+
+
+def test_show_writes_phi_and_says_what_it_is(phigen):
+    shown = phigen("show", SPECS / "kowalevski_top.yaml").stdout
+    assert "phi0" not in shown
+    assert "where φ(s) = " in shown
+
+
+def test_show_says_that_the_maps_of_a_path_are_series(phigen):
+    for options in ([], ["--latex"]):
+        lines = phigen("show", SPECS / "sklyanin_gyrostat.yaml", *options).stdout.splitlines()
+        maps = [line.rstrip("\\ ") for line in lines if line.strip().startswith(("α_", "\\alpha_", "\\beta_"))]
+        assert len(maps) >= 4
+        assert all(line.endswith(("+ …", "+ \\cdots")) for line in maps)
+
+
 # -- run
 
 
