@@ -18,7 +18,7 @@ PHI = ("\\varphi(s)", r"\frac{1}{s} \left( 1 - \frac{\sqrt{s}}{2} \cot \frac{\sq
 def document(compilation: Compilation, modified: int = 0, most: int | None = SHOWN) -> str:
     """Equations for π, H, the Casimirs, α, β, S_1 … S_k, or the parts and flows of a splitting, and H̃.
 
-    ``most`` bounds the terms shown of S_i and H̃; None shows all. ``modified`` is the number of corrections of H̃; with 0,
+    ``most`` bounds the terms shown of S_i and H̃, None shows all. ``modified`` is the number of corrections; with 0,
     the leading one is shown where it costs little. Raises `SpecError` where they are asked for and not computed.
     """
     system = compilation.system
