@@ -32,8 +32,12 @@ class Problem:
     kind: str = "auto"
     splitting: str = ""
     quadratic: bool = True
-    gauges: tuple[str, ...] = ("none", "auto")
+    methods: tuple[str, ...] = ("gauge none", "gauge auto", "splitting")
     constants: Mapping[str, float] = field(default_factory=dict)
+
+    def orders_of(self, method: str) -> tuple[int, ...]:
+        """The orders that a method of phigen is tried at."""
+        return (2, 4, 6, 8, 10) if method == "splitting" else self.orders
 
     @property
     def dimension(self) -> int:
@@ -55,15 +59,17 @@ class Problem:
         pi = sympy.Matrix([[self.parse(e) for e in row] for row in self.poisson])
         return [sympy.factor_terms(sympy.expand(e)) for e in pi * gradient]
 
-    def spec(self, order: int, gauge: str = "none", composition: str = "none") -> str:
-        """A spec of the system, named ``bench``; ``order`` is reached by the series itself unless composed."""
+    def spec(self, order: int, method: str = "gauge none") -> str:
+        """A spec of the system, named ``bench``. ``method`` is ``gauge none`` or ``gauge auto``, by the series to the
+        order itself, or ``splitting``, which is composed."""
+        series = f"birealisation: {self.kind}\ncomposition: none\ngauge: {method.removeprefix('gauge ')}\n"
         rows = "\n".join(f"    - [{', '.join(row)}]" for row in self.poisson)
         casimirs = "".join(f"  {name}: {text}\n" for name, text in self.casimirs.items())
         return (
             f"phigen: 1\nname: bench\ncoordinates: [{', '.join(self.coordinates)}]\n"
             f"poisson:\n  matrix:\n{rows}\nhamiltonian: {self.hamiltonian}\n"
             f"{'casimirs:' if casimirs else ''}\n{casimirs}"
-            f"birealisation: {self.kind}\norder: {order}\ngauge: {gauge}\ncomposition: {composition}\n"
+            f"order: {order}\n{'scheme: splitting' if method == 'splitting' else series}\n"
         )
 
 
@@ -160,10 +166,10 @@ PROBLEMS = (
         "x1 + x2 + x3 - log(x1) - log(x2) - log(x3)",
         {"C": "1.3*log(x1) + 0.7*log(x2) + log(x3)"},
         (1.5, 0.8, 0.6),
-        (4, 6, 8, 10, 12),
+        (4, 6, 8, 10, 12, 14),
         largest=1.0,
         splitting="lotka_volterra",
-        gauges=("none",),
+        methods=("gauge none", "splitting"),
         constants={"A12": 1.0, "A13": -0.7, "A23": 1.3},
     ),
     Problem(
@@ -174,7 +180,7 @@ PROBLEMS = (
         "(P1**2/2 + P2**2/2 + P3**2)/2 + G1",
         {"A": "G1**2 + G2**2 + G3**2", "B": "P1*G1 + P2*G2 + P3*G3"},
         (1.0, 0.5, 0.8, 0.6, 0.0, 0.8),
-        (4, 6, 8, 10),
+        (4, 6, 8, 10, 12),
         largest=1.0,
         splitting="kowalevski",
     ),
@@ -205,6 +211,6 @@ PROBLEMS = (
         kind="karasev",
         splitting="pendulum",
         quadratic=False,
-        gauges=("none",),
+        methods=("gauge none", "splitting"),
     ),
 )

@@ -95,9 +95,9 @@ def build_phigen(text: str) -> Built:
     return Built(library, middle - start, time.perf_counter() - middle, summary)
 
 
-def phigen_method(problem: Problem, order: int, gauge: str, composition: str = "none") -> Method:
-    built = build_phigen(problem.spec(order, gauge, composition))
-    label = f"phigen {order}" + (f", gauge {gauge}" if len(problem.gauges) > 1 else "")
+def phigen_method(problem: Problem, order: int, method: str) -> Method:
+    built = build_phigen(problem.spec(order, method))
+    label = f"phigen {order}, {method}"
     return Method(label, _runner(built.library, 0), order, "phigen", note=built.summary)
 
 

@@ -41,12 +41,13 @@ def methods_of(problem: Problem, effort: Effort) -> tuple[list[Method], list[str
     """phigen's solvers and the peers; what could not be built is a note."""
     notes: list[str] = []
     ours: list[Method] = []
-    for gauge in problem.gauges:
-        for order in problem.orders[1:3] if effort.quick else problem.orders:
+    for method in problem.methods:
+        orders = problem.orders_of(method)
+        for order in orders[1:3] if effort.quick else orders:
             try:
-                ours.append(phigen_method(problem, order, gauge))
+                ours.append(phigen_method(problem, order, method))
             except PhigenError as error:
-                notes.append(f"phigen {order} and above, gauge {gauge}: {str(error).splitlines()[0]}")
+                notes.append(f"phigen {order} and above, {method}: {str(error).splitlines()[0]}")
                 break
     peers = c_peers(problem)
     if not effort.quick:
@@ -140,7 +141,7 @@ def ensembles(effort: Effort) -> list[dict[str, Any]]:
         "RK4 in C, 8 members at once": (vector_rk4(problem), (0.1, 0.05, 0.025, 0.0125))
     }
     for order in (4, 6, 8):
-        built = build_phigen(problem.spec(order, "auto"))
+        built = build_phigen(problem.spec(order, "gauge auto"))
         libraries[f"phigen {order}, gauge auto"] = (built.library, (0.5, 0.25, 0.125))
     rows: dict[tuple[str, float], dict[str, Any]] = {}
     for _ in range(min(effort.rounds, 3)):
@@ -195,7 +196,7 @@ def growth(effort: Effort) -> list[dict[str, Any]]:
         for order in problem.orders:
             try:
                 built = build_phigen(problem.spec(order))
-                methods[f"phigen {order}"] = phigen_method(problem, order, "none")
+                methods[f"phigen {order}"] = phigen_method(problem, order, "gauge none")
                 row = {"n": n, "method": f"build of phigen {order}", "generating": built.generating}
                 rows.append(row | {"compiling": built.compiling})
             except PhigenError as error:
