@@ -14,11 +14,12 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 41d41cc27b4ba63d2cf37733353cc33a4d9d139946d8e67e1fb61d5ac0377451
+ * body-sha256: e89aae5cdfd969b8bf18aea46cfe48e814ea1aff1c1cc81f8a7df36ac494e52a
  */
 #include "ablowitz_ladik3.h"
 
 #include <float.h>
+#include <limits.h>
 #include <math.h>
 #include <stdint.h>
 #include <string.h>

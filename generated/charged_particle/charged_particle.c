@@ -13,11 +13,12 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 0a636e9a97898656b2c5fe4544d78a8aba934994319f8a98431140e97f9abc4c
+ * body-sha256: b38742ad42d5a4b1b46bf784850db223ad851684f346a082b43f091bb057d1b7
  */
 #include "charged_particle.h"
 
 #include <float.h>
+#include <limits.h>
 #include <math.h>
 #include <stdint.h>
 #include <string.h>

@@ -13,11 +13,12 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: a4a1468b71de2fc4e0408aa05ccbb3fecb43dced3ec7ada01347cfec831aa3c1
+ * body-sha256: 9e714c8ac06474ac89af4b9b81707733c70072ec948e86e84e6ba1d7c0889d36
  */
 #include "cyclotron.h"
 
 #include <float.h>
+#include <limits.h>
 #include <math.h>
 #include <stdint.h>
 #include <string.h>
@@ -370,6 +371,7 @@ static cyclotron_status cyclotron_set_step(cyclotron_solver *s, double h)
     s->setback = s->foreseeing = 0;
     s->doubt = s->retry = 0;
     s->effort = 0.0;
+    s->passes = INT_MAX;
     s->h = h;
     s->ready = 1;
     return cyclotron_OK;
@@ -462,6 +464,30 @@ static void cyclotron_linearise_lanes(cyclotron_lanes coef[restrict 3], cyclotro
         increment_jacobian[6][lane] = 0.0;
         increment_jacobian[7][lane] = 0.0;
         increment_jacobian[8][lane] = 0.0;
+    }
+}
+
+/* cyclotron_evaluate in all lanes. */
+static void cyclotron_evaluate_lanes(cyclotron_lanes coef[restrict 3], cyclotron_lanes y[restrict 3],
+                                     cyclotron_lanes displacement[restrict 3],
+                                     cyclotron_lanes increment[restrict 3])
+{
+    cyclotron_EACH_LANE
+    for (int lane = 0; lane < cyclotron_LANES; ++lane) {
+        const double u = y[0][lane];
+        const double v = y[1][lane];
+        const double b = y[2][lane];
+        const double t1 = coef[0][lane] + coef[1][lane] * (b * b);
+        const double p_v = v * t1;
+        const double t2 = b * p_v;
+        const double p_u = u * t1;
+        const double t3 = b * p_u;
+        displacement[0][lane] = (-0.5) * t2;
+        displacement[1][lane] = 0.5 * t3;
+        displacement[2][lane] = 0.0;
+        increment[0][lane] = t2;
+        increment[1][lane] = -t3;
+        increment[2][lane] = 0.0;
     }
 }
 
@@ -569,6 +595,23 @@ static double cyclotron_largest(const cyclotron_lanes size)
     return isfinite(total) ? largest : HUGE_VAL;
 }
 
+/* What is left after a correction of this size: quadratic in it, where the matrices are of the points corrected; where
+   they are of points further off, by bend, also of the order of size times bend. bound is what the last pass left. */
+static double cyclotron_remaining(double size, double bend, double bound)
+{
+    const double growth = size / bound, left = size * (size + bend);
+    return growth > 1.0 ? growth * left : left;
+}
+
+/* The table of a stage, with its matrices or with those of the last pass. */
+static void cyclotron_update(cyclotron_lanes coef[restrict], cyclotron_lines *line, int matrices)
+{
+    if (matrices)
+        cyclotron_tabulate(coef, line);
+    else
+        cyclotron_evaluate_lanes(coef, line->y, line->displacement, line->increment);
+}
+
 /* The steps of a block one after the other, each along the lines of its lane. As X, the state with its carry, gains
    increment - gain residual, the next residual follows from this one; X itself is added up apart. */
 static void cyclotron_chain(cyclotron_lines line[1], double x[3], double carry[3])
@@ -631,8 +674,9 @@ static void cyclotron_foresee(const cyclotron_memory *memory, cyclotron_lanes we
     }
 }
 
-/* Guesses where no recurrence is known: midpoints of steps by the classical Runge-Kutta method. */
-static void cyclotron_march(const cyclotron_solver *s, cyclotron_lines line[1])
+/* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
+   method, to leading order. */
+static void cyclotron_march(const cyclotron_solver *s, cyclotron_table *table, cyclotron_lines line[1])
 {
     static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
     double x[3], point[3], slope[3], mean[3];
@@ -653,6 +697,15 @@ static void cyclotron_march(const cyclotron_solver *s, cyclotron_lines line[1])
             x[i] += h * mean[i];
         }
     }
+    for (int stage = 0; stage < 1; ++stage) {
+        cyclotron_lines *at = &line[stage];
+        cyclotron_evaluate_lanes(table->coef[stage], at->y, at->displacement, at->increment);
+        for (int i = 0; i < 3; ++i) {
+            cyclotron_EACH_LANE
+            for (int lane = 0; lane < cyclotron_LANES; ++lane)
+                at->y[i][lane] -= at->displacement[i][lane] + 0.5 * at->increment[i][lane];
+        }
+    }
 }
 
 /* cyclotron_LANES steps at once: guess the points of all, and correct them together until the error that remains is as
@@ -661,14 +714,15 @@ static int cyclotron_block(cyclotron_solver *s, cyclotron_table *table, int most
 {
     cyclotron_lines line[1];
     cyclotron_lanes sizes;
-    double x[3], carry[3], value[3], previous = HUGE_VAL;
+    double x[3], carry[3], value[3], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
-    if (!s->foreseeing) cyclotron_march(s, line);
+    if (!s->foreseeing) cyclotron_march(s, table, line);
     for (int stage = 0; stage < 1 && s->foreseeing; ++stage)
         cyclotron_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
     while (!solved) {
         double size = 0.0;
-        for (int stage = 0; stage < 1; ++stage) cyclotron_tabulate(table->coef[stage], &line[stage]);
+        const int matrices = previous > 1e-05;
+        for (int stage = 0; stage < 1; ++stage) cyclotron_update(table->coef[stage], &line[stage], matrices);
         memcpy(x, s->x, sizeof x);
         memcpy(carry, s->carry, sizeof carry);
         cyclotron_chain(line, x, carry);
@@ -677,9 +731,10 @@ static int cyclotron_block(cyclotron_solver *s, cyclotron_table *table, int most
             size = fmax(size, cyclotron_largest(sizes));
         }
         s->evaluations += 1 * cyclotron_LANES;
-        const double growth = size / (previous * previous);
+        bend = matrices ? 0.0 : bend + previous;
+        bound = cyclotron_remaining(size, bend, bound);
         /* The second test: after the square of so small a correction there is rounding only. */
-        solved = size * size * (growth > 1.0 ? growth : 1.0) <= 1e-20 || (previous < 1e-8 && size < 1e-10);
+        solved = bound <= 1e-20 || (previous < 1e-8 && size < 1e-10);
         if ((++passes >= most || !(size < previous)) && !solved) return 0;
         previous = size;
     }
@@ -709,26 +764,28 @@ static void cyclotron_choose_guess(cyclotron_solver *s, size_t steps)
             s->foreseeing = 0;
             return;
         }
-    if (s->foreseeing || (steps < 4000 && s->steps < 4000) || s->steps < s->retry) return;
+    if (s->foreseeing || (steps < 4000 && s->steps < 1000) || s->steps < s->retry) return;
     for (int stage = 0; stage < 1; ++stage) cyclotron_fit(&s->memory[stage]);
     s->foreseeing = 1;
     s->pause = cyclotron_LANES;
 }
 
-/* Learn from a block: recurrences that guess no better than steps by Runge-Kutta are given up for a while, and so are
-   blocks that fail with those. */
+/* Learn from a block: after one that failed single steps are made, the more the more often that happens. Recurrences
+   that fail repeatedly, or need more passes than steps by Runge-Kutta did, are given up for a while. */
 static void cyclotron_learn_from(cyclotron_solver *s, int passes)
 {
-    if (s->foreseeing && (passes == 0 || (passes > 1 && passes >= s->passes))) {
-        s->foreseeing = 0;
-        s->doubt = 2 * s->doubt + 4000;
-        s->retry = s->steps + s->doubt;
-    } else if (passes == 0) {
+    if (passes > 0) {
+        s->setback /= 2;
+    } else {
         s->setback = 2 * s->setback + cyclotron_LANES > 1000 ? 1000 : 2 * s->setback + cyclotron_LANES;
         s->pause = s->setback;
-    } else {
-        s->setback /= 2;
-        if (!s->foreseeing) s->passes = passes;
+    }
+    if (!s->foreseeing) {
+        s->passes = passes > 0 ? passes : INT_MAX;
+    } else if (passes > s->passes || s->setback > 5 * cyclotron_LANES) {
+        s->foreseeing = s->setback = s->pause = 0;
+        s->doubt = 2 * s->doubt + 4000;
+        s->retry = s->steps + s->doubt;
     }
 }
 
@@ -877,14 +934,15 @@ static void cyclotron_group_fit(cyclotron_group *group)
     group->patience = group->patience < 10000 ? 2 * group->patience + 1000 : 20000;
 }
 
-/* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group. */
-static int cyclotron_group_open(cyclotron_group *group, const cyclotron_lanes size, const cyclotron_lanes previous)
+/* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group.
+   bound is what remains in each lane. */
+static int cyclotron_group_open(cyclotron_group *group, const cyclotron_lanes size, const cyclotron_lanes previous,
+    double bend, cyclotron_lanes bound)
 {
     int open = 0;
     for (int lane = 0; lane < cyclotron_LANES; ++lane) {
-        const double growth = size[lane] / (previous[lane] * previous[lane]);
-        const double remaining = size[lane] * size[lane] * (growth > 1.0 ? growth : 1.0);
-        const int solved = remaining <= 1e-20 || (previous[lane] < 1e-8 && size[lane] < 1e-10);
+        bound[lane] = cyclotron_remaining(size[lane], bend, bound[lane]);
+        const int solved = bound[lane] <= 1e-20 || (previous[lane] < 1e-8 && size[lane] < 1e-10);
         if (!isfinite(size[lane])) group->active[lane] = 0;
         open += group->active[lane] && !solved;
     }
@@ -895,14 +953,16 @@ static int cyclotron_group_open(cyclotron_group *group, const cyclotron_lanes si
    allowed, lanes that are not solved leave the group. */
 static int cyclotron_group_solve(cyclotron_group *group, int stage, cyclotron_lines *line)
 {
-    cyclotron_lanes size, previous;
+    cyclotron_lanes size, previous, bound;
+    double largest = HUGE_VAL, bend = 0.0;
     int iterations = 0, open = 1;
-    for (int lane = 0; lane < cyclotron_LANES; ++lane) size[lane] = HUGE_VAL;
+    for (int lane = 0; lane < cyclotron_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
     if (group->fitting[stage]) cyclotron_group_foresee(group, stage, line->y);
     else cyclotron_group_extrapolate(group, stage, line->y);
     for (; open > 0 && iterations < 20; ++iterations) {
         memcpy(previous, size, sizeof size);
-        cyclotron_tabulate(group->coef[stage], line);
+        cyclotron_update(group->coef[stage], line, largest > 1e-05);
+        bend = largest > 1e-05 ? 0.0 : bend + largest;
         for (int i = 0; i < 3; ++i) {
             cyclotron_EACH_LANE
             for (int lane = 0; lane < cyclotron_LANES; ++lane)
@@ -910,10 +970,11 @@ static int cyclotron_group_solve(cyclotron_group *group, int stage, cyclotron_li
                     ((line->y[i][lane] - group->x[i][lane]) + line->displacement[i][lane]) - group->carry[i][lane];
         }
         cyclotron_correct(line, size);
-        open = cyclotron_group_open(group, size, previous);
+        open = cyclotron_group_open(group, size, previous, bend, bound);
+        largest = cyclotron_largest(size);
     }
     for (int lane = 0; lane < cyclotron_LANES && open > 0; ++lane)
-        group->active[lane] = group->active[lane] && size[lane] * size[lane] <= 1e-20;
+        group->active[lane] = group->active[lane] && bound[lane] <= 1e-20;
     return iterations;
 }
 

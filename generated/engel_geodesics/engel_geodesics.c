@@ -13,11 +13,12 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: aed30dd4ed5495df2172fc6492278a60346962e32c7085ac22d940371221c68f
+ * body-sha256: 2c4b1c7499042eae834c39cceac496f92445e0d19a1e0dc0554f3dcb0a1a56ba
  */
 #include "engel_geodesics.h"
 
 #include <float.h>
+#include <limits.h>
 #include <math.h>
 #include <stdint.h>
 #include <string.h>
@@ -411,6 +412,7 @@ static engel_geodesics_status engel_geodesics_set_step(engel_geodesics_solver *s
     s->setback = s->foreseeing = 0;
     s->doubt = s->retry = 0;
     s->effort = 0.0;
+    s->passes = INT_MAX;
     s->h = h;
     s->ready = 1;
     return engel_geodesics_OK;
@@ -534,6 +536,36 @@ static void engel_geodesics_linearise_lanes(engel_geodesics_lanes coef[restrict 
         increment_jacobian[13][lane] = 0.0;
         increment_jacobian[14][lane] = 0.0;
         increment_jacobian[15][lane] = 0.0;
+    }
+}
+
+/* engel_geodesics_evaluate in all lanes. */
+static void engel_geodesics_evaluate_lanes(engel_geodesics_lanes coef[restrict 3],
+                                           engel_geodesics_lanes y[restrict 4],
+                                           engel_geodesics_lanes displacement[restrict 4],
+                                           engel_geodesics_lanes increment[restrict 4])
+{
+    engel_geodesics_EACH_LANE
+    for (int lane = 0; lane < engel_geodesics_LANES; ++lane) {
+        const double h1 = y[0][lane];
+        const double h2 = y[1][lane];
+        const double h3 = y[2][lane];
+        const double h4 = y[3][lane];
+        const double t1 = coef[0][lane] + coef[1][lane] * (h3 * h3);
+        const double p_h2 = h2 * t1;
+        const double p_h1 = h1 * t1;
+        const double t2 = h4 * p_h1;
+        const double p_h3 = h3 * (coef[1][lane] * (h1 * h1) + coef[1][lane] * (h2 * h2));
+        const double t3 = h4 * p_h3 + h3 * p_h2;
+        const double t4 = h3 * p_h1;
+        displacement[0][lane] = (-1.0 / 12.0) * (p_h2 * t2) - 0.5 * t3;
+        displacement[1][lane] = 0.5 * t4 + 1.0 / 12.0 * (p_h1 * t2);
+        displacement[2][lane] = 0.5 * t2;
+        displacement[3][lane] = 0.0;
+        increment[0][lane] = t3;
+        increment[1][lane] = -t4;
+        increment[2][lane] = -t2;
+        increment[3][lane] = 0.0;
     }
 }
 
@@ -675,6 +707,23 @@ static double engel_geodesics_largest(const engel_geodesics_lanes size)
     return isfinite(total) ? largest : HUGE_VAL;
 }
 
+/* What is left after a correction of this size: quadratic in it, where the matrices are of the points corrected; where
+   they are of points further off, by bend, also of the order of size times bend. bound is what the last pass left. */
+static double engel_geodesics_remaining(double size, double bend, double bound)
+{
+    const double growth = size / bound, left = size * (size + bend);
+    return growth > 1.0 ? growth * left : left;
+}
+
+/* The table of a stage, with its matrices or with those of the last pass. */
+static void engel_geodesics_update(engel_geodesics_lanes coef[restrict], engel_geodesics_lines *line, int matrices)
+{
+    if (matrices)
+        engel_geodesics_tabulate(coef, line);
+    else
+        engel_geodesics_evaluate_lanes(coef, line->y, line->displacement, line->increment);
+}
+
 /* The steps of a block one after the other, each along the lines of its lane. As X, the state with its carry, gains
    increment - gain residual, the next residual follows from this one; X itself is added up apart. */
 static void engel_geodesics_chain(engel_geodesics_lines line[1], double x[4], double carry[4])
@@ -737,8 +786,9 @@ static void engel_geodesics_foresee(const engel_geodesics_memory *memory, engel_
     }
 }
 
-/* Guesses where no recurrence is known: midpoints of steps by the classical Runge-Kutta method. */
-static void engel_geodesics_march(const engel_geodesics_solver *s, engel_geodesics_lines line[1])
+/* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
+   method, to leading order. */
+static void engel_geodesics_march(const engel_geodesics_solver *s, engel_geodesics_table *table, engel_geodesics_lines line[1])
 {
     static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
     double x[4], point[4], slope[4], mean[4];
@@ -759,6 +809,15 @@ static void engel_geodesics_march(const engel_geodesics_solver *s, engel_geodesi
             x[i] += h * mean[i];
         }
     }
+    for (int stage = 0; stage < 1; ++stage) {
+        engel_geodesics_lines *at = &line[stage];
+        engel_geodesics_evaluate_lanes(table->coef[stage], at->y, at->displacement, at->increment);
+        for (int i = 0; i < 4; ++i) {
+            engel_geodesics_EACH_LANE
+            for (int lane = 0; lane < engel_geodesics_LANES; ++lane)
+                at->y[i][lane] -= at->displacement[i][lane] + 0.5 * at->increment[i][lane];
+        }
+    }
 }
 
 /* engel_geodesics_LANES steps at once: guess the points of all, and correct them together until the error that remains is as
@@ -767,14 +826,15 @@ static int engel_geodesics_block(engel_geodesics_solver *s, engel_geodesics_tabl
 {
     engel_geodesics_lines line[1];
     engel_geodesics_lanes sizes;
-    double x[4], carry[4], value[4], previous = HUGE_VAL;
+    double x[4], carry[4], value[4], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
-    if (!s->foreseeing) engel_geodesics_march(s, line);
+    if (!s->foreseeing) engel_geodesics_march(s, table, line);
     for (int stage = 0; stage < 1 && s->foreseeing; ++stage)
         engel_geodesics_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
     while (!solved) {
         double size = 0.0;
-        for (int stage = 0; stage < 1; ++stage) engel_geodesics_tabulate(table->coef[stage], &line[stage]);
+        const int matrices = previous > 1e-05;
+        for (int stage = 0; stage < 1; ++stage) engel_geodesics_update(table->coef[stage], &line[stage], matrices);
         memcpy(x, s->x, sizeof x);
         memcpy(carry, s->carry, sizeof carry);
         engel_geodesics_chain(line, x, carry);
@@ -783,9 +843,10 @@ static int engel_geodesics_block(engel_geodesics_solver *s, engel_geodesics_tabl
             size = fmax(size, engel_geodesics_largest(sizes));
         }
         s->evaluations += 1 * engel_geodesics_LANES;
-        const double growth = size / (previous * previous);
+        bend = matrices ? 0.0 : bend + previous;
+        bound = engel_geodesics_remaining(size, bend, bound);
         /* The second test: after the square of so small a correction there is rounding only. */
-        solved = size * size * (growth > 1.0 ? growth : 1.0) <= 1e-20 || (previous < 1e-8 && size < 1e-10);
+        solved = bound <= 1e-20 || (previous < 1e-8 && size < 1e-10);
         if ((++passes >= most || !(size < previous)) && !solved) return 0;
         previous = size;
     }
@@ -815,26 +876,28 @@ static void engel_geodesics_choose_guess(engel_geodesics_solver *s, size_t steps
             s->foreseeing = 0;
             return;
         }
-    if (s->foreseeing || (steps < 4000 && s->steps < 4000) || s->steps < s->retry) return;
+    if (s->foreseeing || (steps < 4000 && s->steps < 1000) || s->steps < s->retry) return;
     for (int stage = 0; stage < 1; ++stage) engel_geodesics_fit(&s->memory[stage]);
     s->foreseeing = 1;
     s->pause = engel_geodesics_LANES;
 }
 
-/* Learn from a block: recurrences that guess no better than steps by Runge-Kutta are given up for a while, and so are
-   blocks that fail with those. */
+/* Learn from a block: after one that failed single steps are made, the more the more often that happens. Recurrences
+   that fail repeatedly, or need more passes than steps by Runge-Kutta did, are given up for a while. */
 static void engel_geodesics_learn_from(engel_geodesics_solver *s, int passes)
 {
-    if (s->foreseeing && (passes == 0 || (passes > 1 && passes >= s->passes))) {
-        s->foreseeing = 0;
-        s->doubt = 2 * s->doubt + 4000;
-        s->retry = s->steps + s->doubt;
-    } else if (passes == 0) {
+    if (passes > 0) {
+        s->setback /= 2;
+    } else {
         s->setback = 2 * s->setback + engel_geodesics_LANES > 1000 ? 1000 : 2 * s->setback + engel_geodesics_LANES;
         s->pause = s->setback;
-    } else {
-        s->setback /= 2;
-        if (!s->foreseeing) s->passes = passes;
+    }
+    if (!s->foreseeing) {
+        s->passes = passes > 0 ? passes : INT_MAX;
+    } else if (passes > s->passes || s->setback > 5 * engel_geodesics_LANES) {
+        s->foreseeing = s->setback = s->pause = 0;
+        s->doubt = 2 * s->doubt + 4000;
+        s->retry = s->steps + s->doubt;
     }
 }
 
@@ -983,14 +1046,15 @@ static void engel_geodesics_group_fit(engel_geodesics_group *group)
     group->patience = group->patience < 10000 ? 2 * group->patience + 1000 : 20000;
 }
 
-/* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group. */
-static int engel_geodesics_group_open(engel_geodesics_group *group, const engel_geodesics_lanes size, const engel_geodesics_lanes previous)
+/* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group.
+   bound is what remains in each lane. */
+static int engel_geodesics_group_open(engel_geodesics_group *group, const engel_geodesics_lanes size, const engel_geodesics_lanes previous,
+    double bend, engel_geodesics_lanes bound)
 {
     int open = 0;
     for (int lane = 0; lane < engel_geodesics_LANES; ++lane) {
-        const double growth = size[lane] / (previous[lane] * previous[lane]);
-        const double remaining = size[lane] * size[lane] * (growth > 1.0 ? growth : 1.0);
-        const int solved = remaining <= 1e-20 || (previous[lane] < 1e-8 && size[lane] < 1e-10);
+        bound[lane] = engel_geodesics_remaining(size[lane], bend, bound[lane]);
+        const int solved = bound[lane] <= 1e-20 || (previous[lane] < 1e-8 && size[lane] < 1e-10);
         if (!isfinite(size[lane])) group->active[lane] = 0;
         open += group->active[lane] && !solved;
     }
@@ -1001,14 +1065,16 @@ static int engel_geodesics_group_open(engel_geodesics_group *group, const engel_
    allowed, lanes that are not solved leave the group. */
 static int engel_geodesics_group_solve(engel_geodesics_group *group, int stage, engel_geodesics_lines *line)
 {
-    engel_geodesics_lanes size, previous;
+    engel_geodesics_lanes size, previous, bound;
+    double largest = HUGE_VAL, bend = 0.0;
     int iterations = 0, open = 1;
-    for (int lane = 0; lane < engel_geodesics_LANES; ++lane) size[lane] = HUGE_VAL;
+    for (int lane = 0; lane < engel_geodesics_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
     if (group->fitting[stage]) engel_geodesics_group_foresee(group, stage, line->y);
     else engel_geodesics_group_extrapolate(group, stage, line->y);
     for (; open > 0 && iterations < 20; ++iterations) {
         memcpy(previous, size, sizeof size);
-        engel_geodesics_tabulate(group->coef[stage], line);
+        engel_geodesics_update(group->coef[stage], line, largest > 1e-05);
+        bend = largest > 1e-05 ? 0.0 : bend + largest;
         for (int i = 0; i < 4; ++i) {
             engel_geodesics_EACH_LANE
             for (int lane = 0; lane < engel_geodesics_LANES; ++lane)
@@ -1016,10 +1082,11 @@ static int engel_geodesics_group_solve(engel_geodesics_group *group, int stage, 
                     ((line->y[i][lane] - group->x[i][lane]) + line->displacement[i][lane]) - group->carry[i][lane];
         }
         engel_geodesics_correct(line, size);
-        open = engel_geodesics_group_open(group, size, previous);
+        open = engel_geodesics_group_open(group, size, previous, bend, bound);
+        largest = engel_geodesics_largest(size);
     }
     for (int lane = 0; lane < engel_geodesics_LANES && open > 0; ++lane)
-        group->active[lane] = group->active[lane] && size[lane] * size[lane] <= 1e-20;
+        group->active[lane] = group->active[lane] && bound[lane] <= 1e-20;
     return iterations;
 }
 

@@ -13,11 +13,12 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 5fc3b35eeb2a3029ff2ec1f0def817ffc916a2f482374c2094317805706fcb86
+ * body-sha256: fb84021da60848a5a0b5f783411926024f3fb65a6ce9b60870252b4aeafa45a2
  */
 #include "gaussian_moments.h"
 
 #include <float.h>
+#include <limits.h>
 #include <math.h>
 #include <stdint.h>
 #include <string.h>
@@ -518,6 +519,7 @@ static gaussian_moments_status gaussian_moments_set_step(gaussian_moments_solver
     s->setback = s->foreseeing = 0;
     s->doubt = s->retry = 0;
     s->effort = 0.0;
+    s->passes = INT_MAX;
     s->h = h;
     s->ready = 1;
     return gaussian_moments_OK;
@@ -700,6 +702,33 @@ static void gaussian_moments_linearise_lanes(gaussian_moments_lanes coef[restric
     }
 }
 
+/* gaussian_moments_evaluate in all lanes. */
+static void gaussian_moments_evaluate_lanes(gaussian_moments_lanes coef[restrict 14],
+                                            gaussian_moments_lanes y[restrict 3],
+                                            gaussian_moments_lanes displacement[restrict 3],
+                                            gaussian_moments_lanes increment[restrict 3])
+{
+    gaussian_moments_EACH_LANE
+    for (int lane = 0; lane < gaussian_moments_LANES; ++lane) {
+        const double a = y[0][lane];
+        const double b = y[1][lane];
+        const double c = y[2][lane];
+        const double p_b = coef[7][lane] + b * coef[8][lane] + a * (coef[2][lane] + a * coef[9][lane]);
+        const double p_a = coef[0][lane] + b * coef[2][lane] + coef[1][lane] * (c * c) + a * (coef[3][lane] + b * coef[4][lane] + a * (coef[5][lane] + a * coef[6][lane]));
+        const double p_c = c * (coef[10][lane] + a * coef[11][lane]);
+        const double t1 = gaussian_moments_phi0_lane(4.0 * (p_b * p_a) - 4.0 * (p_c * p_c));
+        const double t2 = c * p_b + 2.0 * (a * p_c);
+        const double t3 = 2.0 * (b * p_b) - 2.0 * (a * p_a);
+        const double t4 = (-2.0) * (b * p_c) - c * p_a;
+        displacement[0][lane] = t1 * (2.0 * (p_c * t2) + p_b * t3) - 0.5 * t2;
+        displacement[1][lane] = t1 * ((-2.0) * (p_c * t4) - p_a * t3) - 0.5 * t4;
+        displacement[2][lane] = t1 * (2.0 * (p_b * t4) - 2.0 * (p_a * t2)) - 0.5 * t3;
+        increment[0][lane] = t2;
+        increment[1][lane] = t4;
+        increment[2][lane] = t3;
+    }
+}
+
 /* gaussian_moments_invert in all lanes. */
 static void gaussian_moments_invert_lanes(gaussian_moments_lanes matrix[restrict 9],
                                           gaussian_moments_lanes slope[restrict 9],
@@ -806,6 +835,23 @@ static double gaussian_moments_largest(const gaussian_moments_lanes size)
     return isfinite(total) ? largest : HUGE_VAL;
 }
 
+/* What is left after a correction of this size: quadratic in it, where the matrices are of the points corrected; where
+   they are of points further off, by bend, also of the order of size times bend. bound is what the last pass left. */
+static double gaussian_moments_remaining(double size, double bend, double bound)
+{
+    const double growth = size / bound, left = size * (size + bend);
+    return growth > 1.0 ? growth * left : left;
+}
+
+/* The table of a stage, with its matrices or with those of the last pass. */
+static void gaussian_moments_update(gaussian_moments_lanes coef[restrict], gaussian_moments_lines *line, int matrices)
+{
+    if (matrices)
+        gaussian_moments_tabulate(coef, line);
+    else
+        gaussian_moments_evaluate_lanes(coef, line->y, line->displacement, line->increment);
+}
+
 /* The steps of a block one after the other, each along the lines of its lane. As X, the state with its carry, gains
    increment - gain residual, the next residual follows from this one; X itself is added up apart. */
 static void gaussian_moments_chain(gaussian_moments_lines line[1], double x[3], double carry[3])
@@ -868,8 +914,9 @@ static void gaussian_moments_foresee(const gaussian_moments_memory *memory, gaus
     }
 }
 
-/* Guesses where no recurrence is known: midpoints of steps by the classical Runge-Kutta method. */
-static void gaussian_moments_march(const gaussian_moments_solver *s, gaussian_moments_lines line[1])
+/* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
+   method, to leading order. */
+static void gaussian_moments_march(const gaussian_moments_solver *s, gaussian_moments_table *table, gaussian_moments_lines line[1])
 {
     static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
     double x[3], point[3], slope[3], mean[3];
@@ -890,6 +937,15 @@ static void gaussian_moments_march(const gaussian_moments_solver *s, gaussian_mo
             x[i] += h * mean[i];
         }
     }
+    for (int stage = 0; stage < 1; ++stage) {
+        gaussian_moments_lines *at = &line[stage];
+        gaussian_moments_evaluate_lanes(table->coef[stage], at->y, at->displacement, at->increment);
+        for (int i = 0; i < 3; ++i) {
+            gaussian_moments_EACH_LANE
+            for (int lane = 0; lane < gaussian_moments_LANES; ++lane)
+                at->y[i][lane] -= at->displacement[i][lane] + 0.5 * at->increment[i][lane];
+        }
+    }
 }
 
 /* gaussian_moments_LANES steps at once: guess the points of all, and correct them together until the error that remains is as
@@ -898,14 +954,15 @@ static int gaussian_moments_block(gaussian_moments_solver *s, gaussian_moments_t
 {
     gaussian_moments_lines line[1];
     gaussian_moments_lanes sizes;
-    double x[3], carry[3], value[3], previous = HUGE_VAL;
+    double x[3], carry[3], value[3], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
-    if (!s->foreseeing) gaussian_moments_march(s, line);
+    if (!s->foreseeing) gaussian_moments_march(s, table, line);
     for (int stage = 0; stage < 1 && s->foreseeing; ++stage)
         gaussian_moments_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
     while (!solved) {
         double size = 0.0;
-        for (int stage = 0; stage < 1; ++stage) gaussian_moments_tabulate(table->coef[stage], &line[stage]);
+        const int matrices = previous > 1e-05;
+        for (int stage = 0; stage < 1; ++stage) gaussian_moments_update(table->coef[stage], &line[stage], matrices);
         memcpy(x, s->x, sizeof x);
         memcpy(carry, s->carry, sizeof carry);
         gaussian_moments_chain(line, x, carry);
@@ -914,9 +971,10 @@ static int gaussian_moments_block(gaussian_moments_solver *s, gaussian_moments_t
             size = fmax(size, gaussian_moments_largest(sizes));
         }
         s->evaluations += 1 * gaussian_moments_LANES;
-        const double growth = size / (previous * previous);
+        bend = matrices ? 0.0 : bend + previous;
+        bound = gaussian_moments_remaining(size, bend, bound);
         /* The second test: after the square of so small a correction there is rounding only. */
-        solved = size * size * (growth > 1.0 ? growth : 1.0) <= 1e-20 || (previous < 1e-8 && size < 1e-10);
+        solved = bound <= 1e-20 || (previous < 1e-8 && size < 1e-10);
         if ((++passes >= most || !(size < previous)) && !solved) return 0;
         previous = size;
     }
@@ -946,26 +1004,28 @@ static void gaussian_moments_choose_guess(gaussian_moments_solver *s, size_t ste
             s->foreseeing = 0;
             return;
         }
-    if (s->foreseeing || (steps < 4000 && s->steps < 4000) || s->steps < s->retry) return;
+    if (s->foreseeing || (steps < 4000 && s->steps < 1000) || s->steps < s->retry) return;
     for (int stage = 0; stage < 1; ++stage) gaussian_moments_fit(&s->memory[stage]);
     s->foreseeing = 1;
     s->pause = gaussian_moments_LANES;
 }
 
-/* Learn from a block: recurrences that guess no better than steps by Runge-Kutta are given up for a while, and so are
-   blocks that fail with those. */
+/* Learn from a block: after one that failed single steps are made, the more the more often that happens. Recurrences
+   that fail repeatedly, or need more passes than steps by Runge-Kutta did, are given up for a while. */
 static void gaussian_moments_learn_from(gaussian_moments_solver *s, int passes)
 {
-    if (s->foreseeing && (passes == 0 || (passes > 1 && passes >= s->passes))) {
-        s->foreseeing = 0;
-        s->doubt = 2 * s->doubt + 4000;
-        s->retry = s->steps + s->doubt;
-    } else if (passes == 0) {
+    if (passes > 0) {
+        s->setback /= 2;
+    } else {
         s->setback = 2 * s->setback + gaussian_moments_LANES > 1000 ? 1000 : 2 * s->setback + gaussian_moments_LANES;
         s->pause = s->setback;
-    } else {
-        s->setback /= 2;
-        if (!s->foreseeing) s->passes = passes;
+    }
+    if (!s->foreseeing) {
+        s->passes = passes > 0 ? passes : INT_MAX;
+    } else if (passes > s->passes || s->setback > 5 * gaussian_moments_LANES) {
+        s->foreseeing = s->setback = s->pause = 0;
+        s->doubt = 2 * s->doubt + 4000;
+        s->retry = s->steps + s->doubt;
     }
 }
 
@@ -1114,14 +1174,15 @@ static void gaussian_moments_group_fit(gaussian_moments_group *group)
     group->patience = group->patience < 10000 ? 2 * group->patience + 1000 : 20000;
 }
 
-/* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group. */
-static int gaussian_moments_group_open(gaussian_moments_group *group, const gaussian_moments_lanes size, const gaussian_moments_lanes previous)
+/* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group.
+   bound is what remains in each lane. */
+static int gaussian_moments_group_open(gaussian_moments_group *group, const gaussian_moments_lanes size, const gaussian_moments_lanes previous,
+    double bend, gaussian_moments_lanes bound)
 {
     int open = 0;
     for (int lane = 0; lane < gaussian_moments_LANES; ++lane) {
-        const double growth = size[lane] / (previous[lane] * previous[lane]);
-        const double remaining = size[lane] * size[lane] * (growth > 1.0 ? growth : 1.0);
-        const int solved = remaining <= 1e-20 || (previous[lane] < 1e-8 && size[lane] < 1e-10);
+        bound[lane] = gaussian_moments_remaining(size[lane], bend, bound[lane]);
+        const int solved = bound[lane] <= 1e-20 || (previous[lane] < 1e-8 && size[lane] < 1e-10);
         if (!isfinite(size[lane])) group->active[lane] = 0;
         open += group->active[lane] && !solved;
     }
@@ -1132,14 +1193,16 @@ static int gaussian_moments_group_open(gaussian_moments_group *group, const gaus
    allowed, lanes that are not solved leave the group. */
 static int gaussian_moments_group_solve(gaussian_moments_group *group, int stage, gaussian_moments_lines *line)
 {
-    gaussian_moments_lanes size, previous;
+    gaussian_moments_lanes size, previous, bound;
+    double largest = HUGE_VAL, bend = 0.0;
     int iterations = 0, open = 1;
-    for (int lane = 0; lane < gaussian_moments_LANES; ++lane) size[lane] = HUGE_VAL;
+    for (int lane = 0; lane < gaussian_moments_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
     if (group->fitting[stage]) gaussian_moments_group_foresee(group, stage, line->y);
     else gaussian_moments_group_extrapolate(group, stage, line->y);
     for (; open > 0 && iterations < 20; ++iterations) {
         memcpy(previous, size, sizeof size);
-        gaussian_moments_tabulate(group->coef[stage], line);
+        gaussian_moments_update(group->coef[stage], line, largest > 1e-05);
+        bend = largest > 1e-05 ? 0.0 : bend + largest;
         for (int i = 0; i < 3; ++i) {
             gaussian_moments_EACH_LANE
             for (int lane = 0; lane < gaussian_moments_LANES; ++lane)
@@ -1147,10 +1210,11 @@ static int gaussian_moments_group_solve(gaussian_moments_group *group, int stage
                     ((line->y[i][lane] - group->x[i][lane]) + line->displacement[i][lane]) - group->carry[i][lane];
         }
         gaussian_moments_correct(line, size);
-        open = gaussian_moments_group_open(group, size, previous);
+        open = gaussian_moments_group_open(group, size, previous, bend, bound);
+        largest = gaussian_moments_largest(size);
     }
     for (int lane = 0; lane < gaussian_moments_LANES && open > 0; ++lane)
-        group->active[lane] = group->active[lane] && size[lane] * size[lane] <= 1e-20;
+        group->active[lane] = group->active[lane] && bound[lane] <= 1e-20;
     return iterations;
 }
 

@@ -14,11 +14,12 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 9585ad843a5659de1f2f67d6d7bb6e7fb7b6dab22edc3160e0760d31ff13e102
+ * body-sha256: b695fca1c4b0c6d0cc3c2bf4e67e6518659d641250ae6d4365a8bdfc158a5df3
  */
 #include "guiding_centre.h"
 
 #include <float.h>
+#include <limits.h>
 #include <math.h>
 #include <stdint.h>
 #include <string.h>

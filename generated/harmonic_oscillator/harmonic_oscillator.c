@@ -13,11 +13,12 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: a4e5d9fe80fd905aa50d9d40ffad67130aee91d0fa593dc7e6596fe59048e4f1
+ * body-sha256: 066071094626ea67c335c11cd3dce5deaf07f253f29dd400fb4c2902d7379c42
  */
 #include "harmonic_oscillator.h"
 
 #include <float.h>
+#include <limits.h>
 #include <math.h>
 #include <stdint.h>
 #include <string.h>
@@ -350,6 +351,7 @@ static harmonic_oscillator_status harmonic_oscillator_set_step(harmonic_oscillat
     s->setback = s->foreseeing = 0;
     s->doubt = s->retry = 0;
     s->effort = 0.0;
+    s->passes = INT_MAX;
     s->h = h;
     s->ready = 1;
     return harmonic_oscillator_OK;
@@ -424,6 +426,25 @@ static void harmonic_oscillator_linearise_lanes(harmonic_oscillator_lanes coef[r
         increment_jacobian[1][lane] = coef[1][lane];
         increment_jacobian[2][lane] = coef[4][lane];
         increment_jacobian[3][lane] = 0.0;
+    }
+}
+
+/* harmonic_oscillator_evaluate in all lanes. */
+static void harmonic_oscillator_evaluate_lanes(harmonic_oscillator_lanes coef[restrict 5],
+                                               harmonic_oscillator_lanes y[restrict 2],
+                                               harmonic_oscillator_lanes displacement[restrict 2],
+                                               harmonic_oscillator_lanes increment[restrict 2])
+{
+    harmonic_oscillator_EACH_LANE
+    for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane) {
+        const double q = y[0][lane];
+        const double p = y[1][lane];
+        const double p_p = coef[1][lane] * p;
+        const double p_q = coef[0][lane] * q;
+        displacement[0][lane] = (-0.5) * p_p;
+        displacement[1][lane] = 0.5 * p_q;
+        increment[0][lane] = p_p;
+        increment[1][lane] = -p_q;
     }
 }
 
@@ -511,6 +532,23 @@ static double harmonic_oscillator_largest(const harmonic_oscillator_lanes size)
     return isfinite(total) ? largest : HUGE_VAL;
 }
 
+/* What is left after a correction of this size: quadratic in it, where the matrices are of the points corrected; where
+   they are of points further off, by bend, also of the order of size times bend. bound is what the last pass left. */
+static double harmonic_oscillator_remaining(double size, double bend, double bound)
+{
+    const double growth = size / bound, left = size * (size + bend);
+    return growth > 1.0 ? growth * left : left;
+}
+
+/* The table of a stage, with its matrices or with those of the last pass. */
+static void harmonic_oscillator_update(harmonic_oscillator_lanes coef[restrict], harmonic_oscillator_lines *line, int matrices)
+{
+    if (matrices)
+        harmonic_oscillator_tabulate(coef, line);
+    else
+        harmonic_oscillator_evaluate_lanes(coef, line->y, line->displacement, line->increment);
+}
+
 /* The steps of a block one after the other, each along the lines of its lane. As X, the state with its carry, gains
    increment - gain residual, the next residual follows from this one; X itself is added up apart. */
 static void harmonic_oscillator_chain(harmonic_oscillator_lines line[1], double x[2], double carry[2])
@@ -573,8 +611,9 @@ static void harmonic_oscillator_foresee(const harmonic_oscillator_memory *memory
     }
 }
 
-/* Guesses where no recurrence is known: midpoints of steps by the classical Runge-Kutta method. */
-static void harmonic_oscillator_march(const harmonic_oscillator_solver *s, harmonic_oscillator_lines line[1])
+/* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
+   method, to leading order. */
+static void harmonic_oscillator_march(const harmonic_oscillator_solver *s, harmonic_oscillator_table *table, harmonic_oscillator_lines line[1])
 {
     static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
     double x[2], point[2], slope[2], mean[2];
@@ -595,6 +634,15 @@ static void harmonic_oscillator_march(const harmonic_oscillator_solver *s, harmo
             x[i] += h * mean[i];
         }
     }
+    for (int stage = 0; stage < 1; ++stage) {
+        harmonic_oscillator_lines *at = &line[stage];
+        harmonic_oscillator_evaluate_lanes(table->coef[stage], at->y, at->displacement, at->increment);
+        for (int i = 0; i < 2; ++i) {
+            harmonic_oscillator_EACH_LANE
+            for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane)
+                at->y[i][lane] -= at->displacement[i][lane] + 0.5 * at->increment[i][lane];
+        }
+    }
 }
 
 /* harmonic_oscillator_LANES steps at once: guess the points of all, and correct them together until the error that remains is as
@@ -603,14 +651,15 @@ static int harmonic_oscillator_block(harmonic_oscillator_solver *s, harmonic_osc
 {
     harmonic_oscillator_lines line[1];
     harmonic_oscillator_lanes sizes;
-    double x[2], carry[2], value[2], previous = HUGE_VAL;
+    double x[2], carry[2], value[2], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
-    if (!s->foreseeing) harmonic_oscillator_march(s, line);
+    if (!s->foreseeing) harmonic_oscillator_march(s, table, line);
     for (int stage = 0; stage < 1 && s->foreseeing; ++stage)
         harmonic_oscillator_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
     while (!solved) {
         double size = 0.0;
-        for (int stage = 0; stage < 1; ++stage) harmonic_oscillator_tabulate(table->coef[stage], &line[stage]);
+        const int matrices = previous > 1e-05;
+        for (int stage = 0; stage < 1; ++stage) harmonic_oscillator_update(table->coef[stage], &line[stage], matrices);
         memcpy(x, s->x, sizeof x);
         memcpy(carry, s->carry, sizeof carry);
         harmonic_oscillator_chain(line, x, carry);
@@ -619,9 +668,10 @@ static int harmonic_oscillator_block(harmonic_oscillator_solver *s, harmonic_osc
             size = fmax(size, harmonic_oscillator_largest(sizes));
         }
         s->evaluations += 1 * harmonic_oscillator_LANES;
-        const double growth = size / (previous * previous);
+        bend = matrices ? 0.0 : bend + previous;
+        bound = harmonic_oscillator_remaining(size, bend, bound);
         /* The second test: after the square of so small a correction there is rounding only. */
-        solved = size * size * (growth > 1.0 ? growth : 1.0) <= 1e-20 || (previous < 1e-8 && size < 1e-10);
+        solved = bound <= 1e-20 || (previous < 1e-8 && size < 1e-10);
         if ((++passes >= most || !(size < previous)) && !solved) return 0;
         previous = size;
     }
@@ -651,26 +701,28 @@ static void harmonic_oscillator_choose_guess(harmonic_oscillator_solver *s, size
             s->foreseeing = 0;
             return;
         }
-    if (s->foreseeing || (steps < 4000 && s->steps < 4000) || s->steps < s->retry) return;
+    if (s->foreseeing || (steps < 4000 && s->steps < 1000) || s->steps < s->retry) return;
     for (int stage = 0; stage < 1; ++stage) harmonic_oscillator_fit(&s->memory[stage]);
     s->foreseeing = 1;
     s->pause = harmonic_oscillator_LANES;
 }
 
-/* Learn from a block: recurrences that guess no better than steps by Runge-Kutta are given up for a while, and so are
-   blocks that fail with those. */
+/* Learn from a block: after one that failed single steps are made, the more the more often that happens. Recurrences
+   that fail repeatedly, or need more passes than steps by Runge-Kutta did, are given up for a while. */
 static void harmonic_oscillator_learn_from(harmonic_oscillator_solver *s, int passes)
 {
-    if (s->foreseeing && (passes == 0 || (passes > 1 && passes >= s->passes))) {
-        s->foreseeing = 0;
-        s->doubt = 2 * s->doubt + 4000;
-        s->retry = s->steps + s->doubt;
-    } else if (passes == 0) {
+    if (passes > 0) {
+        s->setback /= 2;
+    } else {
         s->setback = 2 * s->setback + harmonic_oscillator_LANES > 1000 ? 1000 : 2 * s->setback + harmonic_oscillator_LANES;
         s->pause = s->setback;
-    } else {
-        s->setback /= 2;
-        if (!s->foreseeing) s->passes = passes;
+    }
+    if (!s->foreseeing) {
+        s->passes = passes > 0 ? passes : INT_MAX;
+    } else if (passes > s->passes || s->setback > 5 * harmonic_oscillator_LANES) {
+        s->foreseeing = s->setback = s->pause = 0;
+        s->doubt = 2 * s->doubt + 4000;
+        s->retry = s->steps + s->doubt;
     }
 }
 
@@ -819,14 +871,15 @@ static void harmonic_oscillator_group_fit(harmonic_oscillator_group *group)
     group->patience = group->patience < 10000 ? 2 * group->patience + 1000 : 20000;
 }
 
-/* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group. */
-static int harmonic_oscillator_group_open(harmonic_oscillator_group *group, const harmonic_oscillator_lanes size, const harmonic_oscillator_lanes previous)
+/* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group.
+   bound is what remains in each lane. */
+static int harmonic_oscillator_group_open(harmonic_oscillator_group *group, const harmonic_oscillator_lanes size, const harmonic_oscillator_lanes previous,
+    double bend, harmonic_oscillator_lanes bound)
 {
     int open = 0;
     for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane) {
-        const double growth = size[lane] / (previous[lane] * previous[lane]);
-        const double remaining = size[lane] * size[lane] * (growth > 1.0 ? growth : 1.0);
-        const int solved = remaining <= 1e-20 || (previous[lane] < 1e-8 && size[lane] < 1e-10);
+        bound[lane] = harmonic_oscillator_remaining(size[lane], bend, bound[lane]);
+        const int solved = bound[lane] <= 1e-20 || (previous[lane] < 1e-8 && size[lane] < 1e-10);
         if (!isfinite(size[lane])) group->active[lane] = 0;
         open += group->active[lane] && !solved;
     }
@@ -837,14 +890,16 @@ static int harmonic_oscillator_group_open(harmonic_oscillator_group *group, cons
    allowed, lanes that are not solved leave the group. */
 static int harmonic_oscillator_group_solve(harmonic_oscillator_group *group, int stage, harmonic_oscillator_lines *line)
 {
-    harmonic_oscillator_lanes size, previous;
+    harmonic_oscillator_lanes size, previous, bound;
+    double largest = HUGE_VAL, bend = 0.0;
     int iterations = 0, open = 1;
-    for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane) size[lane] = HUGE_VAL;
+    for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
     if (group->fitting[stage]) harmonic_oscillator_group_foresee(group, stage, line->y);
     else harmonic_oscillator_group_extrapolate(group, stage, line->y);
     for (; open > 0 && iterations < 20; ++iterations) {
         memcpy(previous, size, sizeof size);
-        harmonic_oscillator_tabulate(group->coef[stage], line);
+        harmonic_oscillator_update(group->coef[stage], line, largest > 1e-05);
+        bend = largest > 1e-05 ? 0.0 : bend + largest;
         for (int i = 0; i < 2; ++i) {
             harmonic_oscillator_EACH_LANE
             for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane)
@@ -852,10 +907,11 @@ static int harmonic_oscillator_group_solve(harmonic_oscillator_group *group, int
                     ((line->y[i][lane] - group->x[i][lane]) + line->displacement[i][lane]) - group->carry[i][lane];
         }
         harmonic_oscillator_correct(line, size);
-        open = harmonic_oscillator_group_open(group, size, previous);
+        open = harmonic_oscillator_group_open(group, size, previous, bend, bound);
+        largest = harmonic_oscillator_largest(size);
     }
     for (int lane = 0; lane < harmonic_oscillator_LANES && open > 0; ++lane)
-        group->active[lane] = group->active[lane] && size[lane] * size[lane] <= 1e-20;
+        group->active[lane] = group->active[lane] && bound[lane] <= 1e-20;
     return iterations;
 }
 

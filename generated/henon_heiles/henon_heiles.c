@@ -13,11 +13,12 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 4a1cba50297e71e0e2819f134689ac2e3a6a2e267ce0f9aa03d901c78c53a298
+ * body-sha256: 01b3af0ab5061501be6c93083b32eb1eef5a5858985f6a8495449e1435b3bf30
  */
 #include "henon_heiles.h"
 
 #include <float.h>
+#include <limits.h>
 #include <math.h>
 #include <stdint.h>
 #include <string.h>
@@ -453,6 +454,7 @@ static henon_heiles_status henon_heiles_set_step(henon_heiles_solver *s, double 
     s->setback = s->foreseeing = 0;
     s->doubt = s->retry = 0;
     s->effort = 0.0;
+    s->passes = INT_MAX;
     s->h = h;
     s->ready = 1;
     return henon_heiles_OK;
@@ -587,6 +589,40 @@ static void henon_heiles_linearise_lanes(henon_heiles_lanes coef[restrict 24],
         increment_jacobian[13][lane] = -t28;
         increment_jacobian[14][lane] = -t19;
         increment_jacobian[15][lane] = -t23;
+    }
+}
+
+/* henon_heiles_evaluate in all lanes. */
+static void henon_heiles_evaluate_lanes(henon_heiles_lanes coef[restrict 24], henon_heiles_lanes y[restrict 4],
+                                        henon_heiles_lanes displacement[restrict 4],
+                                        henon_heiles_lanes increment[restrict 4])
+{
+    henon_heiles_EACH_LANE
+    for (int lane = 0; lane < henon_heiles_LANES; ++lane) {
+        const double x = y[0][lane];
+        const double y_ = y[1][lane];
+        const double px = y[2][lane];
+        const double py = y[3][lane];
+        const double t1 = coef[0][lane] + coef[1][lane] * y_;
+        const double t2 = x * x;
+        const double p_px = py * x * t1 + px * (coef[2][lane] + coef[4][lane] * t2 + y_ * (coef[16][lane] + coef[3][lane] * y_));
+        const double t3 = coef[3][lane] * t2;
+        const double p_py = px * x * t1 + py * (coef[2][lane] + t3 + y_ * (coef[17][lane] + coef[4][lane] * y_));
+        const double t4 = px * py;
+        const double t5 = py * py;
+        const double t6 = px * px;
+        const double t7 = x * (coef[3][lane] * t5 + coef[4][lane] * t6 + (coef[2][lane] + coef[8][lane] * t2) + y_ * (coef[5][lane] + coef[9][lane] * t2 + y_ * (coef[6][lane] + coef[7][lane] * y_)));
+        const double p_x = t4 * t1 + t7;
+        const double t8 = y_ * (coef[4][lane] * t5 + coef[3][lane] * t6 + (coef[2][lane] + coef[6][lane] * t2) + y_ * (coef[12][lane] + coef[15][lane] * t2 + y_ * (coef[8][lane] + coef[13][lane] * y_)));
+        const double p_y = coef[10][lane] * t5 + coef[11][lane] * t6 + x * (coef[1][lane] * t4 + x * (coef[14][lane] + t3)) + t8;
+        displacement[0][lane] = (-0.5) * p_px;
+        displacement[1][lane] = (-0.5) * p_py;
+        displacement[2][lane] = 0.5 * p_x;
+        displacement[3][lane] = 0.5 * p_y;
+        increment[0][lane] = p_px;
+        increment[1][lane] = p_py;
+        increment[2][lane] = -p_x;
+        increment[3][lane] = -p_y;
     }
 }
 
@@ -728,6 +764,23 @@ static double henon_heiles_largest(const henon_heiles_lanes size)
     return isfinite(total) ? largest : HUGE_VAL;
 }
 
+/* What is left after a correction of this size: quadratic in it, where the matrices are of the points corrected; where
+   they are of points further off, by bend, also of the order of size times bend. bound is what the last pass left. */
+static double henon_heiles_remaining(double size, double bend, double bound)
+{
+    const double growth = size / bound, left = size * (size + bend);
+    return growth > 1.0 ? growth * left : left;
+}
+
+/* The table of a stage, with its matrices or with those of the last pass. */
+static void henon_heiles_update(henon_heiles_lanes coef[restrict], henon_heiles_lines *line, int matrices)
+{
+    if (matrices)
+        henon_heiles_tabulate(coef, line);
+    else
+        henon_heiles_evaluate_lanes(coef, line->y, line->displacement, line->increment);
+}
+
 /* The steps of a block one after the other, each along the lines of its lane. As X, the state with its carry, gains
    increment - gain residual, the next residual follows from this one; X itself is added up apart. */
 static void henon_heiles_chain(henon_heiles_lines line[1], double x[4], double carry[4])
@@ -790,8 +843,9 @@ static void henon_heiles_foresee(const henon_heiles_memory *memory, henon_heiles
     }
 }
 
-/* Guesses where no recurrence is known: midpoints of steps by the classical Runge-Kutta method. */
-static void henon_heiles_march(const henon_heiles_solver *s, henon_heiles_lines line[1])
+/* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
+   method, to leading order. */
+static void henon_heiles_march(const henon_heiles_solver *s, henon_heiles_table *table, henon_heiles_lines line[1])
 {
     static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
     double x[4], point[4], slope[4], mean[4];
@@ -812,6 +866,15 @@ static void henon_heiles_march(const henon_heiles_solver *s, henon_heiles_lines 
             x[i] += h * mean[i];
         }
     }
+    for (int stage = 0; stage < 1; ++stage) {
+        henon_heiles_lines *at = &line[stage];
+        henon_heiles_evaluate_lanes(table->coef[stage], at->y, at->displacement, at->increment);
+        for (int i = 0; i < 4; ++i) {
+            henon_heiles_EACH_LANE
+            for (int lane = 0; lane < henon_heiles_LANES; ++lane)
+                at->y[i][lane] -= at->displacement[i][lane] + 0.5 * at->increment[i][lane];
+        }
+    }
 }
 
 /* henon_heiles_LANES steps at once: guess the points of all, and correct them together until the error that remains is as
@@ -820,14 +883,15 @@ static int henon_heiles_block(henon_heiles_solver *s, henon_heiles_table *table,
 {
     henon_heiles_lines line[1];
     henon_heiles_lanes sizes;
-    double x[4], carry[4], value[4], previous = HUGE_VAL;
+    double x[4], carry[4], value[4], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
-    if (!s->foreseeing) henon_heiles_march(s, line);
+    if (!s->foreseeing) henon_heiles_march(s, table, line);
     for (int stage = 0; stage < 1 && s->foreseeing; ++stage)
         henon_heiles_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
     while (!solved) {
         double size = 0.0;
-        for (int stage = 0; stage < 1; ++stage) henon_heiles_tabulate(table->coef[stage], &line[stage]);
+        const int matrices = previous > 1e-05;
+        for (int stage = 0; stage < 1; ++stage) henon_heiles_update(table->coef[stage], &line[stage], matrices);
         memcpy(x, s->x, sizeof x);
         memcpy(carry, s->carry, sizeof carry);
         henon_heiles_chain(line, x, carry);
@@ -836,9 +900,10 @@ static int henon_heiles_block(henon_heiles_solver *s, henon_heiles_table *table,
             size = fmax(size, henon_heiles_largest(sizes));
         }
         s->evaluations += 1 * henon_heiles_LANES;
-        const double growth = size / (previous * previous);
+        bend = matrices ? 0.0 : bend + previous;
+        bound = henon_heiles_remaining(size, bend, bound);
         /* The second test: after the square of so small a correction there is rounding only. */
-        solved = size * size * (growth > 1.0 ? growth : 1.0) <= 1e-20 || (previous < 1e-8 && size < 1e-10);
+        solved = bound <= 1e-20 || (previous < 1e-8 && size < 1e-10);
         if ((++passes >= most || !(size < previous)) && !solved) return 0;
         previous = size;
     }
@@ -868,26 +933,28 @@ static void henon_heiles_choose_guess(henon_heiles_solver *s, size_t steps)
             s->foreseeing = 0;
             return;
         }
-    if (s->foreseeing || (steps < 4000 && s->steps < 4000) || s->steps < s->retry) return;
+    if (s->foreseeing || (steps < 4000 && s->steps < 1000) || s->steps < s->retry) return;
     for (int stage = 0; stage < 1; ++stage) henon_heiles_fit(&s->memory[stage]);
     s->foreseeing = 1;
     s->pause = henon_heiles_LANES;
 }
 
-/* Learn from a block: recurrences that guess no better than steps by Runge-Kutta are given up for a while, and so are
-   blocks that fail with those. */
+/* Learn from a block: after one that failed single steps are made, the more the more often that happens. Recurrences
+   that fail repeatedly, or need more passes than steps by Runge-Kutta did, are given up for a while. */
 static void henon_heiles_learn_from(henon_heiles_solver *s, int passes)
 {
-    if (s->foreseeing && (passes == 0 || (passes > 1 && passes >= s->passes))) {
-        s->foreseeing = 0;
-        s->doubt = 2 * s->doubt + 4000;
-        s->retry = s->steps + s->doubt;
-    } else if (passes == 0) {
+    if (passes > 0) {
+        s->setback /= 2;
+    } else {
         s->setback = 2 * s->setback + henon_heiles_LANES > 1000 ? 1000 : 2 * s->setback + henon_heiles_LANES;
         s->pause = s->setback;
-    } else {
-        s->setback /= 2;
-        if (!s->foreseeing) s->passes = passes;
+    }
+    if (!s->foreseeing) {
+        s->passes = passes > 0 ? passes : INT_MAX;
+    } else if (passes > s->passes || s->setback > 5 * henon_heiles_LANES) {
+        s->foreseeing = s->setback = s->pause = 0;
+        s->doubt = 2 * s->doubt + 4000;
+        s->retry = s->steps + s->doubt;
     }
 }
 
@@ -1036,14 +1103,15 @@ static void henon_heiles_group_fit(henon_heiles_group *group)
     group->patience = group->patience < 10000 ? 2 * group->patience + 1000 : 20000;
 }
 
-/* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group. */
-static int henon_heiles_group_open(henon_heiles_group *group, const henon_heiles_lanes size, const henon_heiles_lanes previous)
+/* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group.
+   bound is what remains in each lane. */
+static int henon_heiles_group_open(henon_heiles_group *group, const henon_heiles_lanes size, const henon_heiles_lanes previous,
+    double bend, henon_heiles_lanes bound)
 {
     int open = 0;
     for (int lane = 0; lane < henon_heiles_LANES; ++lane) {
-        const double growth = size[lane] / (previous[lane] * previous[lane]);
-        const double remaining = size[lane] * size[lane] * (growth > 1.0 ? growth : 1.0);
-        const int solved = remaining <= 1e-20 || (previous[lane] < 1e-8 && size[lane] < 1e-10);
+        bound[lane] = henon_heiles_remaining(size[lane], bend, bound[lane]);
+        const int solved = bound[lane] <= 1e-20 || (previous[lane] < 1e-8 && size[lane] < 1e-10);
         if (!isfinite(size[lane])) group->active[lane] = 0;
         open += group->active[lane] && !solved;
     }
@@ -1054,14 +1122,16 @@ static int henon_heiles_group_open(henon_heiles_group *group, const henon_heiles
    allowed, lanes that are not solved leave the group. */
 static int henon_heiles_group_solve(henon_heiles_group *group, int stage, henon_heiles_lines *line)
 {
-    henon_heiles_lanes size, previous;
+    henon_heiles_lanes size, previous, bound;
+    double largest = HUGE_VAL, bend = 0.0;
     int iterations = 0, open = 1;
-    for (int lane = 0; lane < henon_heiles_LANES; ++lane) size[lane] = HUGE_VAL;
+    for (int lane = 0; lane < henon_heiles_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
     if (group->fitting[stage]) henon_heiles_group_foresee(group, stage, line->y);
     else henon_heiles_group_extrapolate(group, stage, line->y);
     for (; open > 0 && iterations < 20; ++iterations) {
         memcpy(previous, size, sizeof size);
-        henon_heiles_tabulate(group->coef[stage], line);
+        henon_heiles_update(group->coef[stage], line, largest > 1e-05);
+        bend = largest > 1e-05 ? 0.0 : bend + largest;
         for (int i = 0; i < 4; ++i) {
             henon_heiles_EACH_LANE
             for (int lane = 0; lane < henon_heiles_LANES; ++lane)
@@ -1069,10 +1139,11 @@ static int henon_heiles_group_solve(henon_heiles_group *group, int stage, henon_
                     ((line->y[i][lane] - group->x[i][lane]) + line->displacement[i][lane]) - group->carry[i][lane];
         }
         henon_heiles_correct(line, size);
-        open = henon_heiles_group_open(group, size, previous);
+        open = henon_heiles_group_open(group, size, previous, bend, bound);
+        largest = henon_heiles_largest(size);
     }
     for (int lane = 0; lane < henon_heiles_LANES && open > 0; ++lane)
-        group->active[lane] = group->active[lane] && size[lane] * size[lane] <= 1e-20;
+        group->active[lane] = group->active[lane] && bound[lane] <= 1e-20;
     return iterations;
 }
 

@@ -13,11 +13,12 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 95f549c099e7929c3dc2ab9bb022a0fb24b44c37801854cff17ac00abac9f251
+ * body-sha256: 268ef202b9c3f322477a8533e1b4eea68994c9f7dcabfb16c7951241dad12370
  */
 #include "kepler.h"
 
 #include <float.h>
+#include <limits.h>
 #include <math.h>
 #include <stdint.h>
 #include <string.h>
@@ -763,6 +764,7 @@ static kepler_status kepler_set_step(kepler_solver *s, double h)
     s->setback = s->foreseeing = 0;
     s->doubt = s->retry = 0;
     s->effort = 0.0;
+    s->passes = INT_MAX;
     s->h = h;
     s->ready = 1;
     return kepler_OK;
@@ -1068,6 +1070,86 @@ static void kepler_linearise_lanes(kepler_lanes coef[restrict 118], kepler_lanes
     kepler_linearise_lanes_part2(coef, y, displacement, increment, jacobian, increment_jacobian, work);
 }
 
+/* kepler_evaluate in all lanes. */
+static void kepler_evaluate_lanes(kepler_lanes coef[restrict 118], kepler_lanes y[restrict 4],
+                                  kepler_lanes displacement[restrict 4], kepler_lanes increment[restrict 4])
+{
+    kepler_EACH_LANE
+    for (int lane = 0; lane < kepler_LANES; ++lane) {
+        const double x = y[0][lane];
+        const double y_ = y[1][lane];
+        const double px = y[2][lane];
+        const double py = y[3][lane];
+        const double t1 = x * x;
+        const double t2 = y_ * y_;
+        const double t3 = t1 + t2;
+        const double t4 = 1.0 / sqrt(t3);
+        const double t5 = t4 * (t4 * t4);
+        const double t6 = 1.0 / t3;
+        const double t7 = x * y_;
+        const double t8 = py * t7;
+        const double t9 = py * py;
+        const double t10 = coef[39][lane] * t9;
+        const double t11 = px * px;
+        const double t12 = coef[39][lane] * t11;
+        const double t13 = px * t2;
+        const double t14 = coef[22][lane] * t9;
+        const double t15 = coef[40][lane] * t4;
+        const double t16 = y_ * (py * t9);
+        const double t17 = py * (px * y_);
+        const double t18 = py * y_;
+        const double t19 = px * x;
+        const double t20 = y_ * t2;
+        const double t21 = coef[25][lane] * t4;
+        const double t22 = coef[27][lane] * t9 + t21;
+        const double t23 = coef[23][lane] * t17;
+        const double t24 = coef[27][lane] * t11 + t21;
+        const double t25 = py * t20 * t22 + x * (coef[25][lane] * (t7 * (py * t4)) + px * (t2 * (coef[23][lane] * t9 + t21) + x * (t23 + x * t24)));
+        const double t26 = t4 * t25;
+        const double t27 = x * (coef[22][lane] * t16 + px * (coef[41][lane] * t17 + x * (coef[43][lane] * t11 + t14)) + t4 * (coef[20][lane] * t18 + coef[42][lane] * t19 + t26));
+        const double t28 = t6 * (coef[18][lane] * t8 + px * (t10 + (t12 + coef[18][lane] * t1)) + t4 * (coef[38][lane] * px + t4 * (t13 * (t14 + t15) + t27)));
+        const double p_px = coef[36][lane] * px + t5 * (coef[37][lane] * px + t28);
+        const double t29 = coef[22][lane] * t11;
+        const double t30 = y_ * (coef[43][lane] * t16 + px * (coef[22][lane] * t17 + x * (coef[41][lane] * t9 + t29)) + t4 * (coef[20][lane] * t19 + coef[42][lane] * t18 + t26));
+        const double t31 = coef[18][lane] * (px * t7) + py * (t10 + (t12 + coef[18][lane] * t2)) + t4 * (coef[38][lane] * py + t4 * (py * t1 * (t29 + t15) + t30));
+        const double p_py = coef[36][lane] * py + t5 * (coef[37][lane] * py + t6 * t31);
+        const double t32 = t29 + t14;
+        const double t33 = coef[10][lane] * t2;
+        const double t34 = coef[19][lane] * t8;
+        const double t35 = coef[6][lane] * t9;
+        const double t36 = coef[10][lane] * t1;
+        const double t37 = coef[8][lane] * t2 + coef[8][lane] * t1;
+        const double t38 = t9 * t9 * t2;
+        const double t39 = t9 * t13;
+        const double t40 = coef[30][lane] + coef[12][lane] * t38 + px * (coef[14][lane] * t39 + x * (coef[23][lane] * t16 + px * (coef[24][lane] * t17 + x * (coef[33][lane] * t11 + coef[12][lane] * t9))));
+        const double t41 = coef[21][lane] * t17;
+        const double t42 = coef[15][lane] * t6;
+        const double t43 = coef[16][lane] * t4;
+        const double t44 = coef[26][lane] * t4;
+        const double t45 = py * t19;
+        const double t46 = y_ * (t45 * (coef[28][lane] * t11 + t44) + y_ * (coef[35][lane] * (t11 * t9) + t4 * (coef[16][lane] * t9 + (coef[16][lane] * t11 + coef[34][lane] * t4))));
+        const double t47 = x * (py * (px * t20) * (coef[28][lane] * t9 + t44) + x * (coef[9][lane] + t1 * (t42 + t11 * (coef[17][lane] * t11 + t43)) + t46));
+        const double t48 = t4 * (t2 * (coef[9][lane] + t2 * (t42 + t9 * (coef[17][lane] * t9 + t43))) + t47);
+        const double t49 = t4 * (t40 + t4 * (t2 * (coef[13][lane] * t11 + coef[11][lane] * t9) + x * (t41 + x * (coef[32][lane] * t11 + coef[31][lane] * t9)) + t48));
+        const double t50 = t9 * (t33 + coef[3][lane] * t9) + px * (t34 + px * (t35 + (t36 + coef[7][lane] * t11))) + t4 * (t37 + (coef[2][lane] * t9 + coef[5][lane] * t11) + t49);
+        const double t51 = coef[18][lane] * t17 + x * (coef[1][lane] * t9 + coef[4][lane] * t11) + t4 * (coef[29][lane] * x + t4 * (t17 * (t32 + t4 * (coef[20][lane] + t2 * (t4 * t22))) + x * t50));
+        const double p_x = t5 * (coef[0][lane] * x + t6 * t51);
+        const double t52 = coef[30][lane] + coef[33][lane] * t38 + px * (coef[12][lane] * t39 + x * (coef[24][lane] * t16 + px * (t23 + x * (coef[14][lane] * t9 + coef[12][lane] * t11))));
+        const double t53 = t4 * (t52 + t4 * (t2 * (coef[32][lane] * t9 + coef[31][lane] * t11) + x * (t41 + x * (coef[13][lane] * t9 + coef[11][lane] * t11)) + t48));
+        const double t54 = t9 * (t33 + coef[7][lane] * t9) + px * (t34 + px * (t35 + (t36 + coef[3][lane] * t11))) + t4 * (t37 + (coef[5][lane] * t9 + coef[2][lane] * t11) + t53);
+        const double t55 = coef[18][lane] * t45 + y_ * (coef[4][lane] * t9 + coef[1][lane] * t11) + t4 * (coef[29][lane] * y_ + t4 * (t45 * (t32 + t4 * (coef[20][lane] + t1 * (t4 * t24))) + y_ * t54));
+        const double p_y = t5 * (coef[0][lane] * y_ + t6 * t55);
+        displacement[0][lane] = (-0.5) * p_px;
+        displacement[1][lane] = (-0.5) * p_py;
+        displacement[2][lane] = 0.5 * p_x;
+        displacement[3][lane] = 0.5 * p_y;
+        increment[0][lane] = p_px;
+        increment[1][lane] = p_py;
+        increment[2][lane] = -p_x;
+        increment[3][lane] = -p_y;
+    }
+}
+
 /* kepler_invert in all lanes. */
 static void kepler_invert_lanes(kepler_lanes matrix[restrict 16], kepler_lanes slope[restrict 16],
                                 kepler_lanes inverse[restrict 16], kepler_lanes gain[restrict 16],
@@ -1204,6 +1286,23 @@ static double kepler_largest(const kepler_lanes size)
     return isfinite(total) ? largest : HUGE_VAL;
 }
 
+/* What is left after a correction of this size: quadratic in it, where the matrices are of the points corrected; where
+   they are of points further off, by bend, also of the order of size times bend. bound is what the last pass left. */
+static double kepler_remaining(double size, double bend, double bound)
+{
+    const double growth = size / bound, left = size * (size + bend);
+    return growth > 1.0 ? growth * left : left;
+}
+
+/* The table of a stage, with its matrices or with those of the last pass. */
+static void kepler_update(kepler_lanes coef[restrict], kepler_lines *line, int matrices)
+{
+    if (matrices)
+        kepler_tabulate(coef, line);
+    else
+        kepler_evaluate_lanes(coef, line->y, line->displacement, line->increment);
+}
+
 /* The steps of a block one after the other, each along the lines of its lane. As X, the state with its carry, gains
    increment - gain residual, the next residual follows from this one; X itself is added up apart. */
 static void kepler_chain(kepler_lines line[1], double x[4], double carry[4])
@@ -1266,8 +1365,9 @@ static void kepler_foresee(const kepler_memory *memory, kepler_lanes weight[rest
     }
 }
 
-/* Guesses where no recurrence is known: midpoints of steps by the classical Runge-Kutta method. */
-static void kepler_march(const kepler_solver *s, kepler_lines line[1])
+/* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
+   method, to leading order. */
+static void kepler_march(const kepler_solver *s, kepler_table *table, kepler_lines line[1])
 {
     static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
     double x[4], point[4], slope[4], mean[4];
@@ -1288,6 +1388,15 @@ static void kepler_march(const kepler_solver *s, kepler_lines line[1])
             x[i] += h * mean[i];
         }
     }
+    for (int stage = 0; stage < 1; ++stage) {
+        kepler_lines *at = &line[stage];
+        kepler_evaluate_lanes(table->coef[stage], at->y, at->displacement, at->increment);
+        for (int i = 0; i < 4; ++i) {
+            kepler_EACH_LANE
+            for (int lane = 0; lane < kepler_LANES; ++lane)
+                at->y[i][lane] -= at->displacement[i][lane] + 0.5 * at->increment[i][lane];
+        }
+    }
 }
 
 /* kepler_LANES steps at once: guess the points of all, and correct them together until the error that remains is as
@@ -1296,14 +1405,15 @@ static int kepler_block(kepler_solver *s, kepler_table *table, int most)
 {
     kepler_lines line[1];
     kepler_lanes sizes;
-    double x[4], carry[4], value[4], previous = HUGE_VAL;
+    double x[4], carry[4], value[4], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
-    if (!s->foreseeing) kepler_march(s, line);
+    if (!s->foreseeing) kepler_march(s, table, line);
     for (int stage = 0; stage < 1 && s->foreseeing; ++stage)
         kepler_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
     while (!solved) {
         double size = 0.0;
-        for (int stage = 0; stage < 1; ++stage) kepler_tabulate(table->coef[stage], &line[stage]);
+        const int matrices = previous > 1e-05;
+        for (int stage = 0; stage < 1; ++stage) kepler_update(table->coef[stage], &line[stage], matrices);
         memcpy(x, s->x, sizeof x);
         memcpy(carry, s->carry, sizeof carry);
         kepler_chain(line, x, carry);
@@ -1312,9 +1422,10 @@ static int kepler_block(kepler_solver *s, kepler_table *table, int most)
             size = fmax(size, kepler_largest(sizes));
         }
         s->evaluations += 1 * kepler_LANES;
-        const double growth = size / (previous * previous);
+        bend = matrices ? 0.0 : bend + previous;
+        bound = kepler_remaining(size, bend, bound);
         /* The second test: after the square of so small a correction there is rounding only. */
-        solved = size * size * (growth > 1.0 ? growth : 1.0) <= 1e-20 || (previous < 1e-8 && size < 1e-10);
+        solved = bound <= 1e-20 || (previous < 1e-8 && size < 1e-10);
         if ((++passes >= most || !(size < previous)) && !solved) return 0;
         previous = size;
     }
@@ -1344,26 +1455,28 @@ static void kepler_choose_guess(kepler_solver *s, size_t steps)
             s->foreseeing = 0;
             return;
         }
-    if (s->foreseeing || (steps < 4000 && s->steps < 4000) || s->steps < s->retry) return;
+    if (s->foreseeing || (steps < 4000 && s->steps < 1000) || s->steps < s->retry) return;
     for (int stage = 0; stage < 1; ++stage) kepler_fit(&s->memory[stage]);
     s->foreseeing = 1;
     s->pause = kepler_LANES;
 }
 
-/* Learn from a block: recurrences that guess no better than steps by Runge-Kutta are given up for a while, and so are
-   blocks that fail with those. */
+/* Learn from a block: after one that failed single steps are made, the more the more often that happens. Recurrences
+   that fail repeatedly, or need more passes than steps by Runge-Kutta did, are given up for a while. */
 static void kepler_learn_from(kepler_solver *s, int passes)
 {
-    if (s->foreseeing && (passes == 0 || (passes > 1 && passes >= s->passes))) {
-        s->foreseeing = 0;
-        s->doubt = 2 * s->doubt + 4000;
-        s->retry = s->steps + s->doubt;
-    } else if (passes == 0) {
+    if (passes > 0) {
+        s->setback /= 2;
+    } else {
         s->setback = 2 * s->setback + kepler_LANES > 1000 ? 1000 : 2 * s->setback + kepler_LANES;
         s->pause = s->setback;
-    } else {
-        s->setback /= 2;
-        if (!s->foreseeing) s->passes = passes;
+    }
+    if (!s->foreseeing) {
+        s->passes = passes > 0 ? passes : INT_MAX;
+    } else if (passes > s->passes || s->setback > 5 * kepler_LANES) {
+        s->foreseeing = s->setback = s->pause = 0;
+        s->doubt = 2 * s->doubt + 4000;
+        s->retry = s->steps + s->doubt;
     }
 }
 
@@ -1512,14 +1625,15 @@ static void kepler_group_fit(kepler_group *group)
     group->patience = group->patience < 10000 ? 2 * group->patience + 1000 : 20000;
 }
 
-/* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group. */
-static int kepler_group_open(kepler_group *group, const kepler_lanes size, const kepler_lanes previous)
+/* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group.
+   bound is what remains in each lane. */
+static int kepler_group_open(kepler_group *group, const kepler_lanes size, const kepler_lanes previous,
+    double bend, kepler_lanes bound)
 {
     int open = 0;
     for (int lane = 0; lane < kepler_LANES; ++lane) {
-        const double growth = size[lane] / (previous[lane] * previous[lane]);
-        const double remaining = size[lane] * size[lane] * (growth > 1.0 ? growth : 1.0);
-        const int solved = remaining <= 1e-20 || (previous[lane] < 1e-8 && size[lane] < 1e-10);
+        bound[lane] = kepler_remaining(size[lane], bend, bound[lane]);
+        const int solved = bound[lane] <= 1e-20 || (previous[lane] < 1e-8 && size[lane] < 1e-10);
         if (!isfinite(size[lane])) group->active[lane] = 0;
         open += group->active[lane] && !solved;
     }
@@ -1530,14 +1644,16 @@ static int kepler_group_open(kepler_group *group, const kepler_lanes size, const
    allowed, lanes that are not solved leave the group. */
 static int kepler_group_solve(kepler_group *group, int stage, kepler_lines *line)
 {
-    kepler_lanes size, previous;
+    kepler_lanes size, previous, bound;
+    double largest = HUGE_VAL, bend = 0.0;
     int iterations = 0, open = 1;
-    for (int lane = 0; lane < kepler_LANES; ++lane) size[lane] = HUGE_VAL;
+    for (int lane = 0; lane < kepler_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
     if (group->fitting[stage]) kepler_group_foresee(group, stage, line->y);
     else kepler_group_extrapolate(group, stage, line->y);
     for (; open > 0 && iterations < 20; ++iterations) {
         memcpy(previous, size, sizeof size);
-        kepler_tabulate(group->coef[stage], line);
+        kepler_update(group->coef[stage], line, largest > 1e-05);
+        bend = largest > 1e-05 ? 0.0 : bend + largest;
         for (int i = 0; i < 4; ++i) {
             kepler_EACH_LANE
             for (int lane = 0; lane < kepler_LANES; ++lane)
@@ -1545,10 +1661,11 @@ static int kepler_group_solve(kepler_group *group, int stage, kepler_lines *line
                     ((line->y[i][lane] - group->x[i][lane]) + line->displacement[i][lane]) - group->carry[i][lane];
         }
         kepler_correct(line, size);
-        open = kepler_group_open(group, size, previous);
+        open = kepler_group_open(group, size, previous, bend, bound);
+        largest = kepler_largest(size);
     }
     for (int lane = 0; lane < kepler_LANES && open > 0; ++lane)
-        group->active[lane] = group->active[lane] && size[lane] * size[lane] <= 1e-20;
+        group->active[lane] = group->active[lane] && bound[lane] <= 1e-20;
     return iterations;
 }
 

@@ -13,11 +13,12 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: da4e0a6f18c9471ffe795d5477d64489105fddcd57841b0887ab247297361c58
+ * body-sha256: bce61df4b1a668ab701e1b1af76ab46304ff5c780bf68b20b30dd74acbb27859
  */
 #include "kowalevski_top.h"
 
 #include <float.h>
+#include <limits.h>
 #include <math.h>
 #include <stdint.h>
 #include <string.h>
@@ -1277,6 +1278,7 @@ static kowalevski_top_status kowalevski_top_set_step(kowalevski_top_solver *s, d
     s->setback = s->foreseeing = 0;
     s->doubt = s->retry = 0;
     s->effort = 0.0;
+    s->passes = INT_MAX;
     s->h = h;
     s->ready = 1;
     return kowalevski_top_OK;
@@ -2072,6 +2074,133 @@ static void kowalevski_top_linearise_lanes(kowalevski_top_lanes coef[restrict 17
     kowalevski_top_linearise_lanes_part3(coef, y, displacement, increment, jacobian, increment_jacobian, work);
 }
 
+/* kowalevski_top_evaluate in all lanes. */
+static void kowalevski_top_evaluate_lanes(kowalevski_top_lanes coef[restrict 172],
+                                          kowalevski_top_lanes y[restrict 6],
+                                          kowalevski_top_lanes displacement[restrict 6],
+                                          kowalevski_top_lanes increment[restrict 6])
+{
+    kowalevski_top_EACH_LANE
+    for (int lane = 0; lane < kowalevski_top_LANES; ++lane) {
+        const double P1 = y[0][lane];
+        const double P2 = y[1][lane];
+        const double P3 = y[2][lane];
+        const double G1 = y[3][lane];
+        const double G2 = y[4][lane];
+        const double G3 = y[5][lane];
+        const double t1 = G2 * P2;
+        const double t2 = P2 * P2;
+        const double t3 = coef[77][lane] * t2;
+        const double t4 = coef[38][lane] + G1 * coef[47][lane];
+        const double t5 = coef[10][lane] + G1 * coef[15][lane];
+        const double t6 = coef[18][lane] * t2;
+        const double t7 = G1 * (coef[3][lane] + G1 * coef[4][lane]);
+        const double t8 = G3 * G3;
+        const double t9 = G2 * G2;
+        const double t10 = coef[0][lane] + coef[2][lane] * t9;
+        const double t11 = t2 * (t5 + t6) + (t7 + (coef[1][lane] * t8 + t10));
+        const double t12 = coef[64][lane] * t1;
+        const double t13 = P1 * P1;
+        const double t14 = coef[10][lane] + G1 * coef[59][lane] + (coef[86][lane] * t2 + coef[18][lane] * t13);
+        const double t15 = P3 * P3;
+        const double t16 = t15 * (coef[72][lane] * t9 + coef[71][lane] * t8) + (coef[49][lane] * t8 + (coef[66][lane] + coef[67][lane] * t9)) + G1 * (coef[69][lane] * t9 + coef[68][lane] * t8 + G1 * (coef[73][lane] * t15 + (coef[21][lane] + G1 * coef[70][lane])));
+        const double t17 = coef[36][lane] * t15;
+        const double t18 = coef[76][lane] * t15;
+        const double t19 = G1 * coef[55][lane];
+        const double t20 = G1 * (coef[5][lane] + t19) + (coef[53][lane] * t8 + (coef[24][lane] + coef[54][lane] * t9));
+        const double t21 = coef[74][lane] * (G3 * (G2 * P3)) + P2 * (t2 * (coef[78][lane] + G1 * coef[79][lane] + (t17 + coef[80][lane] * t2)) + (t15 * (t18 + (coef[12][lane] + G1 * coef[75][lane])) + t20));
+        const double t22 = G3 * P3;
+        const double t23 = G3 * (P2 * P3);
+        const double t24 = t22 * (coef[81][lane] + G1 * coef[82][lane] + coef[83][lane] * t15) + P2 * (coef[40][lane] * t23 + G2 * (coef[49][lane] + G1 * coef[64][lane] + (coef[39][lane] * t2 + coef[84][lane] * t15)));
+        const double t25 = coef[34][lane] + G1 * coef[35][lane];
+        const double t26 = coef[37][lane] * t2;
+        const double t27 = G1 * coef[27][lane];
+        const double t28 = G1 * (coef[12][lane] + t27) + (coef[25][lane] * t8 + (coef[24][lane] + coef[26][lane] * t9));
+        const double t29 = coef[40][lane] * t22;
+        const double t30 = t2 * (t25 + (coef[44][lane] * t15 + t26)) + (t15 * (t18 + (coef[12][lane] + G1 * coef[85][lane])) + t28) + P1 * (coef[39][lane] * t1 + t29 + P1 * (t17 + (coef[78][lane] + G1 * coef[87][lane] + (t26 + coef[80][lane] * t13))));
+        const double p_P3 = G3 * (t1 * (t3 + t4) + P1 * (t11 + P1 * (t12 + P1 * t14))) + P3 * (t16 + P2 * t21 + P1 * (t24 + P1 * t30));
+        const double t31 = coef[8][lane] * t8;
+        const double t32 = t31 + coef[9][lane] * t9;
+        const double t33 = coef[10][lane] + G1 * coef[11][lane];
+        const double t34 = coef[2][lane] * t2;
+        const double t35 = coef[20][lane] + G1 * coef[22][lane];
+        const double t36 = coef[31][lane] * t2;
+        const double t37 = P1 * P2;
+        const double t38 = coef[21][lane] + G1 * coef[23][lane];
+        const double t39 = coef[19][lane] + coef[33][lane] * (G1 * G1 * t2) + t8 * (t35 + (t36 + coef[43][lane] * t13)) + G2 * (coef[41][lane] * (G1 * t37) + G2 * (t38 + (coef[44][lane] * t13 + coef[32][lane] * t2)));
+        const double t40 = coef[5][lane] + G1 * coef[6][lane] + coef[7][lane] * t15;
+        const double t41 = coef[12][lane] + G1 * coef[13][lane];
+        const double t42 = coef[17][lane] * t2;
+        const double t43 = coef[14][lane] * t15;
+        const double t44 = t17 + t26;
+        const double t45 = coef[29][lane] * t15;
+        const double t46 = coef[36][lane] * t1;
+        const double t47 = coef[45][lane] * t2 + coef[37][lane] * t13;
+        const double t48 = t2 * (t25 + t44) + (t15 * (t45 + (coef[28][lane] + G1 * coef[14][lane])) + t28) + P1 * (t46 + t29 + P1 * (t17 + (coef[34][lane] + G1 * coef[17][lane] + t47)));
+        const double t49 = G3 * (t11 + P1 * (coef[30][lane] * t1 + P1 * (coef[38][lane] + G1 * coef[39][lane] + (coef[42][lane] * t2 + coef[46][lane] * t13)))) + P3 * (t22 * t40 + P2 * (coef[16][lane] * t23 + G2 * (t41 + (t42 + t43))) + P1 * t48);
+        const double p_P1 = t1 * (t32 + G1 * (t33 + t34)) + P1 * t39 + P3 * t49;
+        const double t50 = coef[48][lane] * t15;
+        const double t51 = t22 * (t4 + t50);
+        const double t52 = coef[65][lane] * t13;
+        const double t53 = coef[64][lane] * (G3 * P1);
+        const double t54 = coef[17][lane] * t13;
+        const double t55 = coef[58][lane] * t2;
+        const double t56 = coef[33][lane] * t13;
+        const double t57 = t9 * (t55 + (coef[12][lane] + coef[32][lane] * t13)) + (coef[19][lane] + t8 * (t42 + (coef[49][lane] + coef[31][lane] * t13))) + G1 * (G1 * (coef[12][lane] + G1 * coef[52][lane] + (t56 + coef[59][lane] * t2)) + (coef[50][lane] * t8 + G2 * (G2 * coef[51][lane] + coef[1][lane] * t37)));
+        const double t58 = G1 * coef[50][lane];
+        const double t59 = t2 * (coef[34][lane] + t58 + t44) + (t15 * (t45 + (coef[28][lane] + G1 * coef[56][lane])) + t20) + P1 * (coef[62][lane] * t22 + t46 + P1 * (t17 + (t25 + t47)));
+        const double t60 = P2 * (t57 + P3 * (G3 * (coef[57][lane] * t1 + P1 * (coef[60][lane] + G1 * coef[61][lane] + (coef[63][lane] * t13 + coef[63][lane] * t2))) + P3 * t59));
+        const double p_P2 = G2 * (t51 + P1 * (t32 + G1 * (t52 + t33) + P3 * (t53 + P3 * (t41 + (t54 + t43))))) + t60;
+        const double t61 = p_P3 * p_P3 + (p_P1 * p_P1 + p_P2 * p_P2);
+        const double t62 = kowalevski_top_phi0_lane(t61);
+        const double t63 = G1 * coef[90][lane];
+        const double t64 = t2 * (coef[87][lane] * t2 + (coef[49][lane] + t58)) + (G1 * (coef[38][lane] + t63) + (coef[115][lane] * t8 + (coef[114][lane] + coef[108][lane] * t9))) + P1 * (coef[118][lane] * t1 + P1 * (t35 + (t36 + coef[119][lane] * t13)));
+        const double t65 = coef[16][lane] * t15;
+        const double t66 = t2 * (t5 + (t65 + t6)) + (t15 * t40 + (t7 + (coef[117][lane] * t8 + t10))) + P1 * (coef[25][lane] * t22 + t12 + P1 * (t65 + t14));
+        const double t67 = P3 * (t22 * (coef[49][lane] + G1 * coef[68][lane] + coef[116][lane] * t15) + P2 * (coef[53][lane] * t23 + G2 * (t4 + (t3 + t50))) + P1 * t66);
+        const double p_G3 = G3 * t64 + t67;
+        const double t68 = G3 * p_P1 - G1 * p_P3;
+        const double t69 = G1 * coef[91][lane];
+        const double t70 = t15 * (coef[111][lane] * t15 + (coef[67][lane] + G1 * coef[69][lane])) + (G1 * (coef[110][lane] + t69) + (coef[108][lane] * t8 + (coef[107][lane] + coef[109][lane] * t9))) + P1 * (coef[113][lane] * t22 + P1 * (t38 + (coef[26][lane] * t15 + coef[36][lane] * t13)));
+        const double t71 = t31 + G2 * (G2 * coef[90][lane] + coef[32][lane] * t37) + G1 * (t33 + (t52 + t34)) + P3 * (t53 + P3 * (t43 + (t41 + (t42 + t54))));
+        const double p_G2 = G2 * t70 + P2 * (t51 + P2 * (coef[77][lane] * t23 + G2 * (coef[12][lane] + G1 * coef[51][lane] + (coef[112][lane] * t2 + coef[54][lane] * t15))) + P1 * t71);
+        const double t72 = G1 * p_P2 - G2 * p_P1;
+        const double t73 = G2 * P1 * (t52 + (coef[10][lane] + G1 * coef[102][lane])) + P2 * (coef[79][lane] * t8 + G2 * (G2 * coef[96][lane] + coef[2][lane] * t37) + G1 * (coef[12][lane] + G1 * coef[97][lane] + (t56 + t55)));
+        const double t74 = coef[93][lane] * t9 + coef[92][lane] * t8 + G1 * (coef[95][lane] * t15 + (coef[21][lane] + G1 * coef[94][lane])) + t2 * (coef[98][lane] + t19 + (coef[99][lane] * t15 + coef[100][lane] * t2));
+        const double t75 = P3 * (t74 + P1 * (coef[13][lane] * t1 + coef[6][lane] * t22 + P1 * (coef[105][lane] * t15 + (coef[28][lane] + t27 + (coef[97][lane] * t2 + coef[106][lane] * t13)))));
+        const double p_G1 = t9 * (coef[89][lane] + t69 + coef[104][lane] * t13) + (coef[66][lane] + t8 * (coef[103][lane] * t13 + (coef[88][lane] + t63))) + P2 * t73 + P3 * (G3 * (coef[47][lane] * t1 + P1 * (coef[3][lane] + G1 * coef[101][lane] + (coef[15][lane] * t2 + coef[59][lane] * t13))) + t75);
+        const double t76 = G3 * p_G1 - G1 * p_G3 + (P3 * p_P1 - P1 * p_P3);
+        const double t77 = G1 * p_G2 - G2 * p_G1 + (P1 * p_P2 - P2 * p_P1);
+        const double t78 = p_G3 * t68 - p_G2 * t72 + (p_P3 * t76 - p_P2 * t77);
+        const double t79 = kowalevski_top_phi1_lane(t61);
+        const double t80 = G2 * p_P3 - G3 * p_P2;
+        const double t81 = p_P2 * t80 - p_P1 * t68;
+        const double t82 = p_P3 * t68 - p_P2 * t72;
+        const double t83 = p_P1 * t81 - p_P3 * t82;
+        const double t84 = p_P1 * t72 - p_P3 * t80;
+        const double t85 = p_P2 * t82 - p_P1 * t84;
+        const double t86 = G2 * p_G3 - G3 * p_G2 + (P2 * p_P3 - P3 * p_P2);
+        const double t87 = p_G2 * t80 - p_G1 * t68 + (p_P2 * t86 - p_P1 * t76);
+        const double t88 = p_G1 * t81 - p_G3 * t82 + (p_P1 * t87 - p_P3 * t78);
+        const double t89 = p_G1 * t72 - p_G3 * t80 + (p_P1 * t77 - p_P3 * t86);
+        const double t90 = p_G2 * t82 - p_G1 * t84 + (p_P2 * t78 - p_P1 * t89);
+        const double t91 = p_P3 * t84 - p_P2 * t81;
+        const double t92 = p_G3 * t84 - p_G2 * t81 + (p_P3 * t89 - p_P2 * t87);
+        displacement[0][lane] = t62 * t78 - t79 * (t61 * t78 + (p_G3 * t83 - p_G2 * t85 + (p_P3 * t88 - p_P2 * t90))) - 0.5 * t86;
+        displacement[1][lane] = t62 * t89 - t79 * (t61 * t89 + (p_G1 * t85 - p_G3 * t91 + (p_P1 * t90 - p_P3 * t92))) - 0.5 * t76;
+        displacement[2][lane] = t62 * t87 - t79 * (t61 * t87 + (p_G2 * t91 - p_G1 * t83 + (p_P2 * t92 - p_P1 * t88))) - 0.5 * t77;
+        displacement[3][lane] = t82 * t62 - t79 * (t61 * t82 + (p_P3 * t83 - p_P2 * t85)) - 0.5 * t80;
+        displacement[4][lane] = t62 * t84 - t79 * (t61 * t84 + (p_P1 * t85 - p_P3 * t91)) - 0.5 * t68;
+        displacement[5][lane] = t62 * t81 - t79 * (t61 * t81 + (p_P2 * t91 - p_P1 * t83)) - 0.5 * t72;
+        increment[0][lane] = t86;
+        increment[1][lane] = t76;
+        increment[2][lane] = t77;
+        increment[3][lane] = t80;
+        increment[4][lane] = t68;
+        increment[5][lane] = t72;
+    }
+}
+
 /* Invert the matrices of all lanes in place by elimination without pivoting: they are I + O(h). Infinite where a pivot is
    far from 1. */
 static void kowalevski_top_invert(kowalevski_top_lanes matrix[restrict 36])
@@ -2161,6 +2290,23 @@ static double kowalevski_top_largest(const kowalevski_top_lanes size)
     return isfinite(total) ? largest : HUGE_VAL;
 }
 
+/* What is left after a correction of this size: quadratic in it, where the matrices are of the points corrected; where
+   they are of points further off, by bend, also of the order of size times bend. bound is what the last pass left. */
+static double kowalevski_top_remaining(double size, double bend, double bound)
+{
+    const double growth = size / bound, left = size * (size + bend);
+    return growth > 1.0 ? growth * left : left;
+}
+
+/* The table of a stage, with its matrices or with those of the last pass. */
+static void kowalevski_top_update(kowalevski_top_lanes coef[restrict], kowalevski_top_lines *line, int matrices)
+{
+    if (matrices)
+        kowalevski_top_tabulate(coef, line);
+    else
+        kowalevski_top_evaluate_lanes(coef, line->y, line->displacement, line->increment);
+}
+
 /* The steps of a block one after the other, each along the lines of its lane. As X, the state with its carry, gains
    increment - gain residual, the next residual follows from this one; X itself is added up apart. */
 static void kowalevski_top_chain(kowalevski_top_lines line[1], double x[6], double carry[6])
@@ -2223,8 +2369,9 @@ static void kowalevski_top_foresee(const kowalevski_top_memory *memory, kowalevs
     }
 }
 
-/* Guesses where no recurrence is known: midpoints of steps by the classical Runge-Kutta method. */
-static void kowalevski_top_march(const kowalevski_top_solver *s, kowalevski_top_lines line[1])
+/* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
+   method, to leading order. */
+static void kowalevski_top_march(const kowalevski_top_solver *s, kowalevski_top_table *table, kowalevski_top_lines line[1])
 {
     static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
     double x[6], point[6], slope[6], mean[6];
@@ -2245,6 +2392,15 @@ static void kowalevski_top_march(const kowalevski_top_solver *s, kowalevski_top_
             x[i] += h * mean[i];
         }
     }
+    for (int stage = 0; stage < 1; ++stage) {
+        kowalevski_top_lines *at = &line[stage];
+        kowalevski_top_evaluate_lanes(table->coef[stage], at->y, at->displacement, at->increment);
+        for (int i = 0; i < 6; ++i) {
+            kowalevski_top_EACH_LANE
+            for (int lane = 0; lane < kowalevski_top_LANES; ++lane)
+                at->y[i][lane] -= at->displacement[i][lane] + 0.5 * at->increment[i][lane];
+        }
+    }
 }
 
 /* kowalevski_top_LANES steps at once: guess the points of all, and correct them together until the error that remains is as
@@ -2253,14 +2409,15 @@ static int kowalevski_top_block(kowalevski_top_solver *s, kowalevski_top_table *
 {
     kowalevski_top_lines line[1];
     kowalevski_top_lanes sizes;
-    double x[6], carry[6], value[6], previous = HUGE_VAL;
+    double x[6], carry[6], value[6], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
-    if (!s->foreseeing) kowalevski_top_march(s, line);
+    if (!s->foreseeing) kowalevski_top_march(s, table, line);
     for (int stage = 0; stage < 1 && s->foreseeing; ++stage)
         kowalevski_top_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
     while (!solved) {
         double size = 0.0;
-        for (int stage = 0; stage < 1; ++stage) kowalevski_top_tabulate(table->coef[stage], &line[stage]);
+        const int matrices = previous > 1e-05;
+        for (int stage = 0; stage < 1; ++stage) kowalevski_top_update(table->coef[stage], &line[stage], matrices);
         memcpy(x, s->x, sizeof x);
         memcpy(carry, s->carry, sizeof carry);
         kowalevski_top_chain(line, x, carry);
@@ -2269,9 +2426,10 @@ static int kowalevski_top_block(kowalevski_top_solver *s, kowalevski_top_table *
             size = fmax(size, kowalevski_top_largest(sizes));
         }
         s->evaluations += 1 * kowalevski_top_LANES;
-        const double growth = size / (previous * previous);
+        bend = matrices ? 0.0 : bend + previous;
+        bound = kowalevski_top_remaining(size, bend, bound);
         /* The second test: after the square of so small a correction there is rounding only. */
-        solved = size * size * (growth > 1.0 ? growth : 1.0) <= 1e-20 || (previous < 1e-8 && size < 1e-10);
+        solved = bound <= 1e-20 || (previous < 1e-8 && size < 1e-10);
         if ((++passes >= most || !(size < previous)) && !solved) return 0;
         previous = size;
     }
@@ -2301,26 +2459,28 @@ static void kowalevski_top_choose_guess(kowalevski_top_solver *s, size_t steps)
             s->foreseeing = 0;
             return;
         }
-    if (s->foreseeing || (steps < 4000 && s->steps < 4000) || s->steps < s->retry) return;
+    if (s->foreseeing || (steps < 4000 && s->steps < 1000) || s->steps < s->retry) return;
     for (int stage = 0; stage < 1; ++stage) kowalevski_top_fit(&s->memory[stage]);
     s->foreseeing = 1;
     s->pause = kowalevski_top_LANES;
 }
 
-/* Learn from a block: recurrences that guess no better than steps by Runge-Kutta are given up for a while, and so are
-   blocks that fail with those. */
+/* Learn from a block: after one that failed single steps are made, the more the more often that happens. Recurrences
+   that fail repeatedly, or need more passes than steps by Runge-Kutta did, are given up for a while. */
 static void kowalevski_top_learn_from(kowalevski_top_solver *s, int passes)
 {
-    if (s->foreseeing && (passes == 0 || (passes > 1 && passes >= s->passes))) {
-        s->foreseeing = 0;
-        s->doubt = 2 * s->doubt + 4000;
-        s->retry = s->steps + s->doubt;
-    } else if (passes == 0) {
+    if (passes > 0) {
+        s->setback /= 2;
+    } else {
         s->setback = 2 * s->setback + kowalevski_top_LANES > 1000 ? 1000 : 2 * s->setback + kowalevski_top_LANES;
         s->pause = s->setback;
-    } else {
-        s->setback /= 2;
-        if (!s->foreseeing) s->passes = passes;
+    }
+    if (!s->foreseeing) {
+        s->passes = passes > 0 ? passes : INT_MAX;
+    } else if (passes > s->passes || s->setback > 5 * kowalevski_top_LANES) {
+        s->foreseeing = s->setback = s->pause = 0;
+        s->doubt = 2 * s->doubt + 4000;
+        s->retry = s->steps + s->doubt;
     }
 }
 
@@ -2469,14 +2629,15 @@ static void kowalevski_top_group_fit(kowalevski_top_group *group)
     group->patience = group->patience < 10000 ? 2 * group->patience + 1000 : 20000;
 }
 
-/* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group. */
-static int kowalevski_top_group_open(kowalevski_top_group *group, const kowalevski_top_lanes size, const kowalevski_top_lanes previous)
+/* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group.
+   bound is what remains in each lane. */
+static int kowalevski_top_group_open(kowalevski_top_group *group, const kowalevski_top_lanes size, const kowalevski_top_lanes previous,
+    double bend, kowalevski_top_lanes bound)
 {
     int open = 0;
     for (int lane = 0; lane < kowalevski_top_LANES; ++lane) {
-        const double growth = size[lane] / (previous[lane] * previous[lane]);
-        const double remaining = size[lane] * size[lane] * (growth > 1.0 ? growth : 1.0);
-        const int solved = remaining <= 1e-20 || (previous[lane] < 1e-8 && size[lane] < 1e-10);
+        bound[lane] = kowalevski_top_remaining(size[lane], bend, bound[lane]);
+        const int solved = bound[lane] <= 1e-20 || (previous[lane] < 1e-8 && size[lane] < 1e-10);
         if (!isfinite(size[lane])) group->active[lane] = 0;
         open += group->active[lane] && !solved;
     }
@@ -2487,14 +2648,16 @@ static int kowalevski_top_group_open(kowalevski_top_group *group, const kowalevs
    allowed, lanes that are not solved leave the group. */
 static int kowalevski_top_group_solve(kowalevski_top_group *group, int stage, kowalevski_top_lines *line)
 {
-    kowalevski_top_lanes size, previous;
+    kowalevski_top_lanes size, previous, bound;
+    double largest = HUGE_VAL, bend = 0.0;
     int iterations = 0, open = 1;
-    for (int lane = 0; lane < kowalevski_top_LANES; ++lane) size[lane] = HUGE_VAL;
+    for (int lane = 0; lane < kowalevski_top_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
     if (group->fitting[stage]) kowalevski_top_group_foresee(group, stage, line->y);
     else kowalevski_top_group_extrapolate(group, stage, line->y);
     for (; open > 0 && iterations < 20; ++iterations) {
         memcpy(previous, size, sizeof size);
-        kowalevski_top_tabulate(group->coef[stage], line);
+        kowalevski_top_update(group->coef[stage], line, largest > 1e-05);
+        bend = largest > 1e-05 ? 0.0 : bend + largest;
         for (int i = 0; i < 6; ++i) {
             kowalevski_top_EACH_LANE
             for (int lane = 0; lane < kowalevski_top_LANES; ++lane)
@@ -2502,10 +2665,11 @@ static int kowalevski_top_group_solve(kowalevski_top_group *group, int stage, ko
                     ((line->y[i][lane] - group->x[i][lane]) + line->displacement[i][lane]) - group->carry[i][lane];
         }
         kowalevski_top_correct(line, size);
-        open = kowalevski_top_group_open(group, size, previous);
+        open = kowalevski_top_group_open(group, size, previous, bend, bound);
+        largest = kowalevski_top_largest(size);
     }
     for (int lane = 0; lane < kowalevski_top_LANES && open > 0; ++lane)
-        group->active[lane] = group->active[lane] && size[lane] * size[lane] <= 1e-20;
+        group->active[lane] = group->active[lane] && bound[lane] <= 1e-20;
     return iterations;
 }
 

@@ -13,11 +13,12 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 2bfc1ecfa81a020a57d53c5d96eb6ac725b72a6f681067280b35005b4cf5f1f8
+ * body-sha256: d083a89d7709fc00ea807f70eb47c45d3d37e60487151930c408b8bd7db9fd3d
  */
 #include "lagrange_top.h"
 
 #include <float.h>
+#include <limits.h>
 #include <math.h>
 #include <stdint.h>
 #include <string.h>
@@ -871,6 +872,7 @@ static lagrange_top_status lagrange_top_set_step(lagrange_top_solver *s, double 
     s->setback = s->foreseeing = 0;
     s->doubt = s->retry = 0;
     s->effort = 0.0;
+    s->passes = INT_MAX;
     s->h = h;
     s->ready = 1;
     return lagrange_top_OK;
@@ -1419,6 +1421,61 @@ static void lagrange_top_linearise_lanes(lagrange_top_lanes coef[restrict 8], la
     lagrange_top_linearise_lanes_part2(coef, y, displacement, increment, jacobian, increment_jacobian, work);
 }
 
+/* lagrange_top_evaluate in all lanes. */
+static void lagrange_top_evaluate_lanes(lagrange_top_lanes coef[restrict 8], lagrange_top_lanes y[restrict 6],
+                                        lagrange_top_lanes displacement[restrict 6],
+                                        lagrange_top_lanes increment[restrict 6])
+{
+    lagrange_top_EACH_LANE
+    for (int lane = 0; lane < lagrange_top_LANES; ++lane) {
+        const double P1 = y[0][lane];
+        const double P2 = y[1][lane];
+        const double P3 = y[2][lane];
+        const double G1 = y[3][lane];
+        const double G2 = y[4][lane];
+        const double G3 = y[5][lane];
+        const double p_P3 = coef[0][lane] * (G1 * P1) + coef[0][lane] * (G2 * P2) + P3 * (coef[2][lane] * (P2 * P2) + (coef[3][lane] + coef[2][lane] * (P1 * P1)));
+        const double t1 = coef[1][lane] + coef[2][lane] * (P3 * P3);
+        const double p_P1 = coef[0][lane] * (G1 * P3) + P1 * t1;
+        const double p_P2 = coef[0][lane] * (G2 * P3) + P2 * t1;
+        const double t2 = p_P3 * p_P3 + (p_P1 * p_P1 + p_P2 * p_P2);
+        const double t3 = lagrange_top_phi0_lane(t2);
+        const double t4 = G3 * p_P1 - G1 * p_P3;
+        const double p_G2 = G2 * coef[4][lane] + coef[0][lane] * (P2 * P3);
+        const double t5 = G1 * p_P2 - G2 * p_P1;
+        const double p_G1 = G1 * coef[4][lane] + coef[0][lane] * (P1 * P3);
+        const double t6 = G3 * p_G1 - G1 * coef[5][lane] + (P3 * p_P1 - P1 * p_P3);
+        const double t7 = G1 * p_G2 - G2 * p_G1 + (P1 * p_P2 - P2 * p_P1);
+        const double t8 = coef[5][lane] * t4 - p_G2 * t5 + (p_P3 * t6 - p_P2 * t7);
+        const double t9 = lagrange_top_phi1_lane(t2);
+        const double t10 = G2 * p_P3 - G3 * p_P2;
+        const double t11 = p_P2 * t10 - p_P1 * t4;
+        const double t12 = p_P3 * t4 - p_P2 * t5;
+        const double t13 = p_P1 * t11 - p_P3 * t12;
+        const double t14 = p_P1 * t5 - p_P3 * t10;
+        const double t15 = p_P2 * t12 - p_P1 * t14;
+        const double t16 = G2 * coef[5][lane] - G3 * p_G2 + (P2 * p_P3 - P3 * p_P2);
+        const double t17 = p_G2 * t10 - p_G1 * t4 + (p_P2 * t16 - p_P1 * t6);
+        const double t18 = p_G1 * t11 - coef[5][lane] * t12 + (p_P1 * t17 - p_P3 * t8);
+        const double t19 = p_G1 * t5 - coef[5][lane] * t10 + (p_P1 * t7 - p_P3 * t16);
+        const double t20 = p_G2 * t12 - p_G1 * t14 + (p_P2 * t8 - p_P1 * t19);
+        const double t21 = p_P3 * t14 - p_P2 * t11;
+        const double t22 = coef[5][lane] * t14 - p_G2 * t11 + (p_P3 * t19 - p_P2 * t17);
+        displacement[0][lane] = t3 * t8 - t9 * (t2 * t8 + (coef[5][lane] * t13 - p_G2 * t15 + (p_P3 * t18 - p_P2 * t20))) - 0.5 * t16;
+        displacement[1][lane] = t3 * t19 - t9 * (t2 * t19 + (p_G1 * t15 - coef[5][lane] * t21 + (p_P1 * t20 - p_P3 * t22))) - 0.5 * t6;
+        displacement[2][lane] = t3 * t17 - t9 * (t2 * t17 + (p_G2 * t21 - p_G1 * t13 + (p_P2 * t22 - p_P1 * t18))) - 0.5 * t7;
+        displacement[3][lane] = t3 * t12 - t9 * (t2 * t12 + (p_P3 * t13 - p_P2 * t15)) - 0.5 * t10;
+        displacement[4][lane] = t3 * t14 - t9 * (t2 * t14 + (p_P1 * t15 - p_P3 * t21)) - 0.5 * t4;
+        displacement[5][lane] = t3 * t11 - t9 * (t2 * t11 + (p_P2 * t21 - p_P1 * t13)) - 0.5 * t5;
+        increment[0][lane] = t16;
+        increment[1][lane] = t6;
+        increment[2][lane] = t7;
+        increment[3][lane] = t10;
+        increment[4][lane] = t4;
+        increment[5][lane] = t5;
+    }
+}
+
 /* Invert the matrices of all lanes in place by elimination without pivoting: they are I + O(h). Infinite where a pivot is
    far from 1. */
 static void lagrange_top_invert(lagrange_top_lanes matrix[restrict 36])
@@ -1508,6 +1565,23 @@ static double lagrange_top_largest(const lagrange_top_lanes size)
     return isfinite(total) ? largest : HUGE_VAL;
 }
 
+/* What is left after a correction of this size: quadratic in it, where the matrices are of the points corrected; where
+   they are of points further off, by bend, also of the order of size times bend. bound is what the last pass left. */
+static double lagrange_top_remaining(double size, double bend, double bound)
+{
+    const double growth = size / bound, left = size * (size + bend);
+    return growth > 1.0 ? growth * left : left;
+}
+
+/* The table of a stage, with its matrices or with those of the last pass. */
+static void lagrange_top_update(lagrange_top_lanes coef[restrict], lagrange_top_lines *line, int matrices)
+{
+    if (matrices)
+        lagrange_top_tabulate(coef, line);
+    else
+        lagrange_top_evaluate_lanes(coef, line->y, line->displacement, line->increment);
+}
+
 /* The steps of a block one after the other, each along the lines of its lane. As X, the state with its carry, gains
    increment - gain residual, the next residual follows from this one; X itself is added up apart. */
 static void lagrange_top_chain(lagrange_top_lines line[1], double x[6], double carry[6])
@@ -1570,8 +1644,9 @@ static void lagrange_top_foresee(const lagrange_top_memory *memory, lagrange_top
     }
 }
 
-/* Guesses where no recurrence is known: midpoints of steps by the classical Runge-Kutta method. */
-static void lagrange_top_march(const lagrange_top_solver *s, lagrange_top_lines line[1])
+/* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
+   method, to leading order. */
+static void lagrange_top_march(const lagrange_top_solver *s, lagrange_top_table *table, lagrange_top_lines line[1])
 {
     static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
     double x[6], point[6], slope[6], mean[6];
@@ -1592,6 +1667,15 @@ static void lagrange_top_march(const lagrange_top_solver *s, lagrange_top_lines 
             x[i] += h * mean[i];
         }
     }
+    for (int stage = 0; stage < 1; ++stage) {
+        lagrange_top_lines *at = &line[stage];
+        lagrange_top_evaluate_lanes(table->coef[stage], at->y, at->displacement, at->increment);
+        for (int i = 0; i < 6; ++i) {
+            lagrange_top_EACH_LANE
+            for (int lane = 0; lane < lagrange_top_LANES; ++lane)
+                at->y[i][lane] -= at->displacement[i][lane] + 0.5 * at->increment[i][lane];
+        }
+    }
 }
 
 /* lagrange_top_LANES steps at once: guess the points of all, and correct them together until the error that remains is as
@@ -1600,14 +1684,15 @@ static int lagrange_top_block(lagrange_top_solver *s, lagrange_top_table *table,
 {
     lagrange_top_lines line[1];
     lagrange_top_lanes sizes;
-    double x[6], carry[6], value[6], previous = HUGE_VAL;
+    double x[6], carry[6], value[6], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
-    if (!s->foreseeing) lagrange_top_march(s, line);
+    if (!s->foreseeing) lagrange_top_march(s, table, line);
     for (int stage = 0; stage < 1 && s->foreseeing; ++stage)
         lagrange_top_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
     while (!solved) {
         double size = 0.0;
-        for (int stage = 0; stage < 1; ++stage) lagrange_top_tabulate(table->coef[stage], &line[stage]);
+        const int matrices = previous > 1e-05;
+        for (int stage = 0; stage < 1; ++stage) lagrange_top_update(table->coef[stage], &line[stage], matrices);
         memcpy(x, s->x, sizeof x);
         memcpy(carry, s->carry, sizeof carry);
         lagrange_top_chain(line, x, carry);
@@ -1616,9 +1701,10 @@ static int lagrange_top_block(lagrange_top_solver *s, lagrange_top_table *table,
             size = fmax(size, lagrange_top_largest(sizes));
         }
         s->evaluations += 1 * lagrange_top_LANES;
-        const double growth = size / (previous * previous);
+        bend = matrices ? 0.0 : bend + previous;
+        bound = lagrange_top_remaining(size, bend, bound);
         /* The second test: after the square of so small a correction there is rounding only. */
-        solved = size * size * (growth > 1.0 ? growth : 1.0) <= 1e-20 || (previous < 1e-8 && size < 1e-10);
+        solved = bound <= 1e-20 || (previous < 1e-8 && size < 1e-10);
         if ((++passes >= most || !(size < previous)) && !solved) return 0;
         previous = size;
     }
@@ -1648,26 +1734,28 @@ static void lagrange_top_choose_guess(lagrange_top_solver *s, size_t steps)
             s->foreseeing = 0;
             return;
         }
-    if (s->foreseeing || (steps < 4000 && s->steps < 4000) || s->steps < s->retry) return;
+    if (s->foreseeing || (steps < 4000 && s->steps < 1000) || s->steps < s->retry) return;
     for (int stage = 0; stage < 1; ++stage) lagrange_top_fit(&s->memory[stage]);
     s->foreseeing = 1;
     s->pause = lagrange_top_LANES;
 }
 
-/* Learn from a block: recurrences that guess no better than steps by Runge-Kutta are given up for a while, and so are
-   blocks that fail with those. */
+/* Learn from a block: after one that failed single steps are made, the more the more often that happens. Recurrences
+   that fail repeatedly, or need more passes than steps by Runge-Kutta did, are given up for a while. */
 static void lagrange_top_learn_from(lagrange_top_solver *s, int passes)
 {
-    if (s->foreseeing && (passes == 0 || (passes > 1 && passes >= s->passes))) {
-        s->foreseeing = 0;
-        s->doubt = 2 * s->doubt + 4000;
-        s->retry = s->steps + s->doubt;
-    } else if (passes == 0) {
+    if (passes > 0) {
+        s->setback /= 2;
+    } else {
         s->setback = 2 * s->setback + lagrange_top_LANES > 1000 ? 1000 : 2 * s->setback + lagrange_top_LANES;
         s->pause = s->setback;
-    } else {
-        s->setback /= 2;
-        if (!s->foreseeing) s->passes = passes;
+    }
+    if (!s->foreseeing) {
+        s->passes = passes > 0 ? passes : INT_MAX;
+    } else if (passes > s->passes || s->setback > 5 * lagrange_top_LANES) {
+        s->foreseeing = s->setback = s->pause = 0;
+        s->doubt = 2 * s->doubt + 4000;
+        s->retry = s->steps + s->doubt;
     }
 }
 
@@ -1816,14 +1904,15 @@ static void lagrange_top_group_fit(lagrange_top_group *group)
     group->patience = group->patience < 10000 ? 2 * group->patience + 1000 : 20000;
 }
 
-/* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group. */
-static int lagrange_top_group_open(lagrange_top_group *group, const lagrange_top_lanes size, const lagrange_top_lanes previous)
+/* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group.
+   bound is what remains in each lane. */
+static int lagrange_top_group_open(lagrange_top_group *group, const lagrange_top_lanes size, const lagrange_top_lanes previous,
+    double bend, lagrange_top_lanes bound)
 {
     int open = 0;
     for (int lane = 0; lane < lagrange_top_LANES; ++lane) {
-        const double growth = size[lane] / (previous[lane] * previous[lane]);
-        const double remaining = size[lane] * size[lane] * (growth > 1.0 ? growth : 1.0);
-        const int solved = remaining <= 1e-20 || (previous[lane] < 1e-8 && size[lane] < 1e-10);
+        bound[lane] = lagrange_top_remaining(size[lane], bend, bound[lane]);
+        const int solved = bound[lane] <= 1e-20 || (previous[lane] < 1e-8 && size[lane] < 1e-10);
         if (!isfinite(size[lane])) group->active[lane] = 0;
         open += group->active[lane] && !solved;
     }
@@ -1834,14 +1923,16 @@ static int lagrange_top_group_open(lagrange_top_group *group, const lagrange_top
    allowed, lanes that are not solved leave the group. */
 static int lagrange_top_group_solve(lagrange_top_group *group, int stage, lagrange_top_lines *line)
 {
-    lagrange_top_lanes size, previous;
+    lagrange_top_lanes size, previous, bound;
+    double largest = HUGE_VAL, bend = 0.0;
     int iterations = 0, open = 1;
-    for (int lane = 0; lane < lagrange_top_LANES; ++lane) size[lane] = HUGE_VAL;
+    for (int lane = 0; lane < lagrange_top_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
     if (group->fitting[stage]) lagrange_top_group_foresee(group, stage, line->y);
     else lagrange_top_group_extrapolate(group, stage, line->y);
     for (; open > 0 && iterations < 20; ++iterations) {
         memcpy(previous, size, sizeof size);
-        lagrange_top_tabulate(group->coef[stage], line);
+        lagrange_top_update(group->coef[stage], line, largest > 1e-05);
+        bend = largest > 1e-05 ? 0.0 : bend + largest;
         for (int i = 0; i < 6; ++i) {
             lagrange_top_EACH_LANE
             for (int lane = 0; lane < lagrange_top_LANES; ++lane)
@@ -1849,10 +1940,11 @@ static int lagrange_top_group_solve(lagrange_top_group *group, int stage, lagran
                     ((line->y[i][lane] - group->x[i][lane]) + line->displacement[i][lane]) - group->carry[i][lane];
         }
         lagrange_top_correct(line, size);
-        open = lagrange_top_group_open(group, size, previous);
+        open = lagrange_top_group_open(group, size, previous, bend, bound);
+        largest = lagrange_top_largest(size);
     }
     for (int lane = 0; lane < lagrange_top_LANES && open > 0; ++lane)
-        group->active[lane] = group->active[lane] && size[lane] * size[lane] <= 1e-20;
+        group->active[lane] = group->active[lane] && bound[lane] <= 1e-20;
     return iterations;
 }
 

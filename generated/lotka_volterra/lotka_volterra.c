@@ -13,11 +13,12 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 4f66b2300ffae7d880a135d988b781293d479f26f1ed31e521fdae6eb4eb16d3
+ * body-sha256: 2ed19fdde383cbb0d4fb71e4c19f17e7273261b728a175104ebd86409bcd7c0f
  */
 #include "lotka_volterra.h"
 
 #include <float.h>
+#include <limits.h>
 #include <math.h>
 #include <stdint.h>
 #include <string.h>
@@ -387,6 +388,7 @@ static lotka_volterra_status lotka_volterra_set_step(lotka_volterra_solver *s, d
     s->setback = s->foreseeing = 0;
     s->doubt = s->retry = 0;
     s->effort = 0.0;
+    s->passes = INT_MAX;
     s->h = h;
     s->ready = 1;
     return lotka_volterra_OK;
@@ -529,6 +531,32 @@ static void lotka_volterra_linearise_lanes(lotka_volterra_lanes coef[restrict 1]
     }
 }
 
+/* lotka_volterra_evaluate in all lanes. */
+static void lotka_volterra_evaluate_lanes(lotka_volterra_lanes coef[restrict 1],
+                                          lotka_volterra_lanes y[restrict 3],
+                                          lotka_volterra_lanes displacement[restrict 3],
+                                          lotka_volterra_lanes increment[restrict 3])
+{
+    lotka_volterra_EACH_LANE
+    for (int lane = 0; lane < lotka_volterra_LANES; ++lane) {
+        const double x1 = y[0][lane];
+        const double x2 = y[1][lane];
+        const double x3 = y[2][lane];
+        const double t1 = coef[0][lane] * x2;
+        const double t2 = coef[0][lane] * x3;
+        const double t3 = lotka_volterra_expm1_lane((-0.5) * (t1 + t2));
+        const double t4 = coef[0][lane] * x1;
+        const double t5 = lotka_volterra_expm1_lane(0.5 * (t4 - t2));
+        const double t6 = lotka_volterra_expm1_lane(0.5 * (t1 + t4));
+        displacement[0][lane] = x1 * t3;
+        displacement[1][lane] = x2 * t5;
+        displacement[2][lane] = x3 * t6;
+        increment[0][lane] = -(x1 * (t3 * (1.0 + 1.0 / (1.0 + t3))));
+        increment[1][lane] = -(x2 * (t5 * (1.0 + 1.0 / (1.0 + t5))));
+        increment[2][lane] = -(x3 * (t6 * (1.0 + 1.0 / (1.0 + t6))));
+    }
+}
+
 /* lotka_volterra_invert in all lanes. */
 static void lotka_volterra_invert_lanes(lotka_volterra_lanes matrix[restrict 9],
                                         lotka_volterra_lanes slope[restrict 9],
@@ -635,6 +663,23 @@ static double lotka_volterra_largest(const lotka_volterra_lanes size)
     return isfinite(total) ? largest : HUGE_VAL;
 }
 
+/* What is left after a correction of this size: quadratic in it, where the matrices are of the points corrected; where
+   they are of points further off, by bend, also of the order of size times bend. bound is what the last pass left. */
+static double lotka_volterra_remaining(double size, double bend, double bound)
+{
+    const double growth = size / bound, left = size * (size + bend);
+    return growth > 1.0 ? growth * left : left;
+}
+
+/* The table of a stage, with its matrices or with those of the last pass. */
+static void lotka_volterra_update(lotka_volterra_lanes coef[restrict], lotka_volterra_lines *line, int matrices)
+{
+    if (matrices)
+        lotka_volterra_tabulate(coef, line);
+    else
+        lotka_volterra_evaluate_lanes(coef, line->y, line->displacement, line->increment);
+}
+
 /* The steps of a block one after the other, each along the lines of its lane. As X, the state with its carry, gains
    increment - gain residual, the next residual follows from this one; X itself is added up apart. */
 static void lotka_volterra_chain(lotka_volterra_lines line[1], double x[3], double carry[3])
@@ -697,8 +742,9 @@ static void lotka_volterra_foresee(const lotka_volterra_memory *memory, lotka_vo
     }
 }
 
-/* Guesses where no recurrence is known: midpoints of steps by the classical Runge-Kutta method. */
-static void lotka_volterra_march(const lotka_volterra_solver *s, lotka_volterra_lines line[1])
+/* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
+   method, to leading order. */
+static void lotka_volterra_march(const lotka_volterra_solver *s, lotka_volterra_table *table, lotka_volterra_lines line[1])
 {
     static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
     double x[3], point[3], slope[3], mean[3];
@@ -719,6 +765,15 @@ static void lotka_volterra_march(const lotka_volterra_solver *s, lotka_volterra_
             x[i] += h * mean[i];
         }
     }
+    for (int stage = 0; stage < 1; ++stage) {
+        lotka_volterra_lines *at = &line[stage];
+        lotka_volterra_evaluate_lanes(table->coef[stage], at->y, at->displacement, at->increment);
+        for (int i = 0; i < 3; ++i) {
+            lotka_volterra_EACH_LANE
+            for (int lane = 0; lane < lotka_volterra_LANES; ++lane)
+                at->y[i][lane] -= at->displacement[i][lane] + 0.5 * at->increment[i][lane];
+        }
+    }
 }
 
 /* lotka_volterra_LANES steps at once: guess the points of all, and correct them together until the error that remains is as
@@ -727,14 +782,15 @@ static int lotka_volterra_block(lotka_volterra_solver *s, lotka_volterra_table *
 {
     lotka_volterra_lines line[1];
     lotka_volterra_lanes sizes;
-    double x[3], carry[3], value[3], previous = HUGE_VAL;
+    double x[3], carry[3], value[3], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
-    if (!s->foreseeing) lotka_volterra_march(s, line);
+    if (!s->foreseeing) lotka_volterra_march(s, table, line);
     for (int stage = 0; stage < 1 && s->foreseeing; ++stage)
         lotka_volterra_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
     while (!solved) {
         double size = 0.0;
-        for (int stage = 0; stage < 1; ++stage) lotka_volterra_tabulate(table->coef[stage], &line[stage]);
+        const int matrices = previous > 1e-05;
+        for (int stage = 0; stage < 1; ++stage) lotka_volterra_update(table->coef[stage], &line[stage], matrices);
         memcpy(x, s->x, sizeof x);
         memcpy(carry, s->carry, sizeof carry);
         lotka_volterra_chain(line, x, carry);
@@ -743,9 +799,10 @@ static int lotka_volterra_block(lotka_volterra_solver *s, lotka_volterra_table *
             size = fmax(size, lotka_volterra_largest(sizes));
         }
         s->evaluations += 1 * lotka_volterra_LANES;
-        const double growth = size / (previous * previous);
+        bend = matrices ? 0.0 : bend + previous;
+        bound = lotka_volterra_remaining(size, bend, bound);
         /* The second test: after the square of so small a correction there is rounding only. */
-        solved = size * size * (growth > 1.0 ? growth : 1.0) <= 1e-20 || (previous < 1e-8 && size < 1e-10);
+        solved = bound <= 1e-20 || (previous < 1e-8 && size < 1e-10);
         if ((++passes >= most || !(size < previous)) && !solved) return 0;
         previous = size;
     }
@@ -775,26 +832,28 @@ static void lotka_volterra_choose_guess(lotka_volterra_solver *s, size_t steps)
             s->foreseeing = 0;
             return;
         }
-    if (s->foreseeing || (steps < 4000 && s->steps < 4000) || s->steps < s->retry) return;
+    if (s->foreseeing || (steps < 4000 && s->steps < 1000) || s->steps < s->retry) return;
     for (int stage = 0; stage < 1; ++stage) lotka_volterra_fit(&s->memory[stage]);
     s->foreseeing = 1;
     s->pause = lotka_volterra_LANES;
 }
 
-/* Learn from a block: recurrences that guess no better than steps by Runge-Kutta are given up for a while, and so are
-   blocks that fail with those. */
+/* Learn from a block: after one that failed single steps are made, the more the more often that happens. Recurrences
+   that fail repeatedly, or need more passes than steps by Runge-Kutta did, are given up for a while. */
 static void lotka_volterra_learn_from(lotka_volterra_solver *s, int passes)
 {
-    if (s->foreseeing && (passes == 0 || (passes > 1 && passes >= s->passes))) {
-        s->foreseeing = 0;
-        s->doubt = 2 * s->doubt + 4000;
-        s->retry = s->steps + s->doubt;
-    } else if (passes == 0) {
+    if (passes > 0) {
+        s->setback /= 2;
+    } else {
         s->setback = 2 * s->setback + lotka_volterra_LANES > 1000 ? 1000 : 2 * s->setback + lotka_volterra_LANES;
         s->pause = s->setback;
-    } else {
-        s->setback /= 2;
-        if (!s->foreseeing) s->passes = passes;
+    }
+    if (!s->foreseeing) {
+        s->passes = passes > 0 ? passes : INT_MAX;
+    } else if (passes > s->passes || s->setback > 5 * lotka_volterra_LANES) {
+        s->foreseeing = s->setback = s->pause = 0;
+        s->doubt = 2 * s->doubt + 4000;
+        s->retry = s->steps + s->doubt;
     }
 }
 
@@ -943,14 +1002,15 @@ static void lotka_volterra_group_fit(lotka_volterra_group *group)
     group->patience = group->patience < 10000 ? 2 * group->patience + 1000 : 20000;
 }
 
-/* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group. */
-static int lotka_volterra_group_open(lotka_volterra_group *group, const lotka_volterra_lanes size, const lotka_volterra_lanes previous)
+/* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group.
+   bound is what remains in each lane. */
+static int lotka_volterra_group_open(lotka_volterra_group *group, const lotka_volterra_lanes size, const lotka_volterra_lanes previous,
+    double bend, lotka_volterra_lanes bound)
 {
     int open = 0;
     for (int lane = 0; lane < lotka_volterra_LANES; ++lane) {
-        const double growth = size[lane] / (previous[lane] * previous[lane]);
-        const double remaining = size[lane] * size[lane] * (growth > 1.0 ? growth : 1.0);
-        const int solved = remaining <= 1e-20 || (previous[lane] < 1e-8 && size[lane] < 1e-10);
+        bound[lane] = lotka_volterra_remaining(size[lane], bend, bound[lane]);
+        const int solved = bound[lane] <= 1e-20 || (previous[lane] < 1e-8 && size[lane] < 1e-10);
         if (!isfinite(size[lane])) group->active[lane] = 0;
         open += group->active[lane] && !solved;
     }
@@ -961,14 +1021,16 @@ static int lotka_volterra_group_open(lotka_volterra_group *group, const lotka_vo
    allowed, lanes that are not solved leave the group. */
 static int lotka_volterra_group_solve(lotka_volterra_group *group, int stage, lotka_volterra_lines *line)
 {
-    lotka_volterra_lanes size, previous;
+    lotka_volterra_lanes size, previous, bound;
+    double largest = HUGE_VAL, bend = 0.0;
     int iterations = 0, open = 1;
-    for (int lane = 0; lane < lotka_volterra_LANES; ++lane) size[lane] = HUGE_VAL;
+    for (int lane = 0; lane < lotka_volterra_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
     if (group->fitting[stage]) lotka_volterra_group_foresee(group, stage, line->y);
     else lotka_volterra_group_extrapolate(group, stage, line->y);
     for (; open > 0 && iterations < 20; ++iterations) {
         memcpy(previous, size, sizeof size);
-        lotka_volterra_tabulate(group->coef[stage], line);
+        lotka_volterra_update(group->coef[stage], line, largest > 1e-05);
+        bend = largest > 1e-05 ? 0.0 : bend + largest;
         for (int i = 0; i < 3; ++i) {
             lotka_volterra_EACH_LANE
             for (int lane = 0; lane < lotka_volterra_LANES; ++lane)
@@ -976,10 +1038,11 @@ static int lotka_volterra_group_solve(lotka_volterra_group *group, int stage, lo
                     ((line->y[i][lane] - group->x[i][lane]) + line->displacement[i][lane]) - group->carry[i][lane];
         }
         lotka_volterra_correct(line, size);
-        open = lotka_volterra_group_open(group, size, previous);
+        open = lotka_volterra_group_open(group, size, previous, bend, bound);
+        largest = lotka_volterra_largest(size);
     }
     for (int lane = 0; lane < lotka_volterra_LANES && open > 0; ++lane)
-        group->active[lane] = group->active[lane] && size[lane] * size[lane] <= 1e-20;
+        group->active[lane] = group->active[lane] && bound[lane] <= 1e-20;
     return iterations;
 }
 

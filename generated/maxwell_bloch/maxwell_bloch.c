@@ -13,11 +13,12 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 44389983785da377ce082a70021f8ee35c06247c19a0b9eb91ff55b55e705bb8
+ * body-sha256: ef4d9d37ed5b88de31228a7e4fbffde69e2f2b68ec2506ce802e61079c3ce1c6
  */
 #include "maxwell_bloch.h"
 
 #include <float.h>
+#include <limits.h>
 #include <math.h>
 #include <stdint.h>
 #include <string.h>
@@ -377,6 +378,7 @@ static maxwell_bloch_status maxwell_bloch_set_step(maxwell_bloch_solver *s, doub
     s->setback = s->foreseeing = 0;
     s->doubt = s->retry = 0;
     s->effort = 0.0;
+    s->passes = INT_MAX;
     s->h = h;
     s->ready = 1;
     return maxwell_bloch_OK;
@@ -476,6 +478,32 @@ static void maxwell_bloch_linearise_lanes(maxwell_bloch_lanes coef[restrict 3],
         increment_jacobian[6][lane] = -(x * t5 + p_y);
         increment_jacobian[7][lane] = -t11;
         increment_jacobian[8][lane] = 0.0;
+    }
+}
+
+/* maxwell_bloch_evaluate in all lanes. */
+static void maxwell_bloch_evaluate_lanes(maxwell_bloch_lanes coef[restrict 3],
+                                         maxwell_bloch_lanes y[restrict 3],
+                                         maxwell_bloch_lanes displacement[restrict 3],
+                                         maxwell_bloch_lanes increment[restrict 3])
+{
+    maxwell_bloch_EACH_LANE
+    for (int lane = 0; lane < maxwell_bloch_LANES; ++lane) {
+        const double x = y[0][lane];
+        const double y_ = y[1][lane];
+        const double z = y[2][lane];
+        const double t1 = coef[1][lane] + coef[0][lane] * (x * x);
+        const double p_y = y_ * t1;
+        const double p_z = z * t1;
+        const double p_x = x * (coef[0][lane] * (y_ * y_) + coef[0][lane] * (z * z));
+        const double t2 = x * p_z - p_x;
+        const double t3 = x * p_y;
+        displacement[0][lane] = (-0.5) * p_y;
+        displacement[1][lane] = 1.0 / 12.0 * (p_z * p_y) - 0.5 * t2;
+        displacement[2][lane] = 0.5 * t3 - 1.0 / 12.0 * (p_y * p_y);
+        increment[0][lane] = p_y;
+        increment[1][lane] = t2;
+        increment[2][lane] = -t3;
     }
 }
 
@@ -585,6 +613,23 @@ static double maxwell_bloch_largest(const maxwell_bloch_lanes size)
     return isfinite(total) ? largest : HUGE_VAL;
 }
 
+/* What is left after a correction of this size: quadratic in it, where the matrices are of the points corrected; where
+   they are of points further off, by bend, also of the order of size times bend. bound is what the last pass left. */
+static double maxwell_bloch_remaining(double size, double bend, double bound)
+{
+    const double growth = size / bound, left = size * (size + bend);
+    return growth > 1.0 ? growth * left : left;
+}
+
+/* The table of a stage, with its matrices or with those of the last pass. */
+static void maxwell_bloch_update(maxwell_bloch_lanes coef[restrict], maxwell_bloch_lines *line, int matrices)
+{
+    if (matrices)
+        maxwell_bloch_tabulate(coef, line);
+    else
+        maxwell_bloch_evaluate_lanes(coef, line->y, line->displacement, line->increment);
+}
+
 /* The steps of a block one after the other, each along the lines of its lane. As X, the state with its carry, gains
    increment - gain residual, the next residual follows from this one; X itself is added up apart. */
 static void maxwell_bloch_chain(maxwell_bloch_lines line[1], double x[3], double carry[3])
@@ -647,8 +692,9 @@ static void maxwell_bloch_foresee(const maxwell_bloch_memory *memory, maxwell_bl
     }
 }
 
-/* Guesses where no recurrence is known: midpoints of steps by the classical Runge-Kutta method. */
-static void maxwell_bloch_march(const maxwell_bloch_solver *s, maxwell_bloch_lines line[1])
+/* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
+   method, to leading order. */
+static void maxwell_bloch_march(const maxwell_bloch_solver *s, maxwell_bloch_table *table, maxwell_bloch_lines line[1])
 {
     static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
     double x[3], point[3], slope[3], mean[3];
@@ -669,6 +715,15 @@ static void maxwell_bloch_march(const maxwell_bloch_solver *s, maxwell_bloch_lin
             x[i] += h * mean[i];
         }
     }
+    for (int stage = 0; stage < 1; ++stage) {
+        maxwell_bloch_lines *at = &line[stage];
+        maxwell_bloch_evaluate_lanes(table->coef[stage], at->y, at->displacement, at->increment);
+        for (int i = 0; i < 3; ++i) {
+            maxwell_bloch_EACH_LANE
+            for (int lane = 0; lane < maxwell_bloch_LANES; ++lane)
+                at->y[i][lane] -= at->displacement[i][lane] + 0.5 * at->increment[i][lane];
+        }
+    }
 }
 
 /* maxwell_bloch_LANES steps at once: guess the points of all, and correct them together until the error that remains is as
@@ -677,14 +732,15 @@ static int maxwell_bloch_block(maxwell_bloch_solver *s, maxwell_bloch_table *tab
 {
     maxwell_bloch_lines line[1];
     maxwell_bloch_lanes sizes;
-    double x[3], carry[3], value[3], previous = HUGE_VAL;
+    double x[3], carry[3], value[3], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
-    if (!s->foreseeing) maxwell_bloch_march(s, line);
+    if (!s->foreseeing) maxwell_bloch_march(s, table, line);
     for (int stage = 0; stage < 1 && s->foreseeing; ++stage)
         maxwell_bloch_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
     while (!solved) {
         double size = 0.0;
-        for (int stage = 0; stage < 1; ++stage) maxwell_bloch_tabulate(table->coef[stage], &line[stage]);
+        const int matrices = previous > 1e-05;
+        for (int stage = 0; stage < 1; ++stage) maxwell_bloch_update(table->coef[stage], &line[stage], matrices);
         memcpy(x, s->x, sizeof x);
         memcpy(carry, s->carry, sizeof carry);
         maxwell_bloch_chain(line, x, carry);
@@ -693,9 +749,10 @@ static int maxwell_bloch_block(maxwell_bloch_solver *s, maxwell_bloch_table *tab
             size = fmax(size, maxwell_bloch_largest(sizes));
         }
         s->evaluations += 1 * maxwell_bloch_LANES;
-        const double growth = size / (previous * previous);
+        bend = matrices ? 0.0 : bend + previous;
+        bound = maxwell_bloch_remaining(size, bend, bound);
         /* The second test: after the square of so small a correction there is rounding only. */
-        solved = size * size * (growth > 1.0 ? growth : 1.0) <= 1e-20 || (previous < 1e-8 && size < 1e-10);
+        solved = bound <= 1e-20 || (previous < 1e-8 && size < 1e-10);
         if ((++passes >= most || !(size < previous)) && !solved) return 0;
         previous = size;
     }
@@ -725,26 +782,28 @@ static void maxwell_bloch_choose_guess(maxwell_bloch_solver *s, size_t steps)
             s->foreseeing = 0;
             return;
         }
-    if (s->foreseeing || (steps < 4000 && s->steps < 4000) || s->steps < s->retry) return;
+    if (s->foreseeing || (steps < 4000 && s->steps < 1000) || s->steps < s->retry) return;
     for (int stage = 0; stage < 1; ++stage) maxwell_bloch_fit(&s->memory[stage]);
     s->foreseeing = 1;
     s->pause = maxwell_bloch_LANES;
 }
 
-/* Learn from a block: recurrences that guess no better than steps by Runge-Kutta are given up for a while, and so are
-   blocks that fail with those. */
+/* Learn from a block: after one that failed single steps are made, the more the more often that happens. Recurrences
+   that fail repeatedly, or need more passes than steps by Runge-Kutta did, are given up for a while. */
 static void maxwell_bloch_learn_from(maxwell_bloch_solver *s, int passes)
 {
-    if (s->foreseeing && (passes == 0 || (passes > 1 && passes >= s->passes))) {
-        s->foreseeing = 0;
-        s->doubt = 2 * s->doubt + 4000;
-        s->retry = s->steps + s->doubt;
-    } else if (passes == 0) {
+    if (passes > 0) {
+        s->setback /= 2;
+    } else {
         s->setback = 2 * s->setback + maxwell_bloch_LANES > 1000 ? 1000 : 2 * s->setback + maxwell_bloch_LANES;
         s->pause = s->setback;
-    } else {
-        s->setback /= 2;
-        if (!s->foreseeing) s->passes = passes;
+    }
+    if (!s->foreseeing) {
+        s->passes = passes > 0 ? passes : INT_MAX;
+    } else if (passes > s->passes || s->setback > 5 * maxwell_bloch_LANES) {
+        s->foreseeing = s->setback = s->pause = 0;
+        s->doubt = 2 * s->doubt + 4000;
+        s->retry = s->steps + s->doubt;
     }
 }
 
@@ -893,14 +952,15 @@ static void maxwell_bloch_group_fit(maxwell_bloch_group *group)
     group->patience = group->patience < 10000 ? 2 * group->patience + 1000 : 20000;
 }
 
-/* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group. */
-static int maxwell_bloch_group_open(maxwell_bloch_group *group, const maxwell_bloch_lanes size, const maxwell_bloch_lanes previous)
+/* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group.
+   bound is what remains in each lane. */
+static int maxwell_bloch_group_open(maxwell_bloch_group *group, const maxwell_bloch_lanes size, const maxwell_bloch_lanes previous,
+    double bend, maxwell_bloch_lanes bound)
 {
     int open = 0;
     for (int lane = 0; lane < maxwell_bloch_LANES; ++lane) {
-        const double growth = size[lane] / (previous[lane] * previous[lane]);
-        const double remaining = size[lane] * size[lane] * (growth > 1.0 ? growth : 1.0);
-        const int solved = remaining <= 1e-20 || (previous[lane] < 1e-8 && size[lane] < 1e-10);
+        bound[lane] = maxwell_bloch_remaining(size[lane], bend, bound[lane]);
+        const int solved = bound[lane] <= 1e-20 || (previous[lane] < 1e-8 && size[lane] < 1e-10);
         if (!isfinite(size[lane])) group->active[lane] = 0;
         open += group->active[lane] && !solved;
     }
@@ -911,14 +971,16 @@ static int maxwell_bloch_group_open(maxwell_bloch_group *group, const maxwell_bl
    allowed, lanes that are not solved leave the group. */
 static int maxwell_bloch_group_solve(maxwell_bloch_group *group, int stage, maxwell_bloch_lines *line)
 {
-    maxwell_bloch_lanes size, previous;
+    maxwell_bloch_lanes size, previous, bound;
+    double largest = HUGE_VAL, bend = 0.0;
     int iterations = 0, open = 1;
-    for (int lane = 0; lane < maxwell_bloch_LANES; ++lane) size[lane] = HUGE_VAL;
+    for (int lane = 0; lane < maxwell_bloch_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
     if (group->fitting[stage]) maxwell_bloch_group_foresee(group, stage, line->y);
     else maxwell_bloch_group_extrapolate(group, stage, line->y);
     for (; open > 0 && iterations < 20; ++iterations) {
         memcpy(previous, size, sizeof size);
-        maxwell_bloch_tabulate(group->coef[stage], line);
+        maxwell_bloch_update(group->coef[stage], line, largest > 1e-05);
+        bend = largest > 1e-05 ? 0.0 : bend + largest;
         for (int i = 0; i < 3; ++i) {
             maxwell_bloch_EACH_LANE
             for (int lane = 0; lane < maxwell_bloch_LANES; ++lane)
@@ -926,10 +988,11 @@ static int maxwell_bloch_group_solve(maxwell_bloch_group *group, int stage, maxw
                     ((line->y[i][lane] - group->x[i][lane]) + line->displacement[i][lane]) - group->carry[i][lane];
         }
         maxwell_bloch_correct(line, size);
-        open = maxwell_bloch_group_open(group, size, previous);
+        open = maxwell_bloch_group_open(group, size, previous, bend, bound);
+        largest = maxwell_bloch_largest(size);
     }
     for (int lane = 0; lane < maxwell_bloch_LANES && open > 0; ++lane)
-        group->active[lane] = group->active[lane] && size[lane] * size[lane] <= 1e-20;
+        group->active[lane] = group->active[lane] && bound[lane] <= 1e-20;
     return iterations;
 }
 

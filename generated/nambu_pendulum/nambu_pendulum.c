@@ -13,11 +13,12 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: a52c2caecbfd3e9a92b71b19cd80940fc79e1f25fa5f3bb5f77a263866c06a3b
+ * body-sha256: cebfd8f6f4bfb342eb6f13f40dcd421e6e41e34b472ecfcd711ca92287f55d87
  */
 #include "nambu_pendulum.h"
 
 #include <float.h>
+#include <limits.h>
 #include <math.h>
 #include <stdint.h>
 #include <string.h>

@@ -13,11 +13,12 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: c0d3e82e68f75675304b6e3bdfa88fd765aa528640701c51271f24d6bfa16d84
+ * body-sha256: 39e584cd7e6c45de416e208b4eed0318ce8309d2c170cf666b7eef6cbfc1f6ba
  */
 #include "pendulum.h"
 
 #include <float.h>
+#include <limits.h>
 #include <math.h>
 #include <stdint.h>
 #include <string.h>
@@ -381,6 +382,7 @@ static pendulum_status pendulum_set_step(pendulum_solver *s, double h)
     s->setback = s->foreseeing = 0;
     s->doubt = s->retry = 0;
     s->effort = 0.0;
+    s->passes = INT_MAX;
     s->h = h;
     s->ready = 1;
     return pendulum_OK;
@@ -468,6 +470,28 @@ static void pendulum_linearise_lanes(pendulum_lanes coef[restrict 19], pendulum_
     }
 }
 
+/* pendulum_evaluate in all lanes. */
+static void pendulum_evaluate_lanes(pendulum_lanes coef[restrict 19], pendulum_lanes y[restrict 2],
+                                    pendulum_lanes displacement[restrict 2],
+                                    pendulum_lanes increment[restrict 2])
+{
+    pendulum_EACH_LANE
+    for (int lane = 0; lane < pendulum_LANES; ++lane) {
+        const double q = y[0][lane];
+        const double p = y[1][lane];
+        const double t1 = sin(q);
+        const double t2 = t1 * t1;
+        const double t3 = cos(q);
+        const double t4 = p * p;
+        const double p_p = p * (coef[7][lane] + coef[8][lane] * t2 + t3 * (coef[11][lane] * t4 + (coef[9][lane] + coef[10][lane] * t3)));
+        const double p_q = t1 * (t4 * (coef[6][lane] * t4 + (coef[5][lane] + coef[4][lane] * t3)) + (t3 * (coef[0][lane] + coef[3][lane] * t3) + (coef[1][lane] + coef[2][lane] * t2)));
+        displacement[0][lane] = (-0.5) * p_p;
+        displacement[1][lane] = 0.5 * p_q;
+        increment[0][lane] = p_p;
+        increment[1][lane] = -p_q;
+    }
+}
+
 /* pendulum_invert in all lanes. */
 static void pendulum_invert_lanes(pendulum_lanes matrix[restrict 4], pendulum_lanes slope[restrict 4],
                                   pendulum_lanes inverse[restrict 4], pendulum_lanes gain[restrict 4],
@@ -550,6 +574,23 @@ static double pendulum_largest(const pendulum_lanes size)
     return isfinite(total) ? largest : HUGE_VAL;
 }
 
+/* What is left after a correction of this size: quadratic in it, where the matrices are of the points corrected; where
+   they are of points further off, by bend, also of the order of size times bend. bound is what the last pass left. */
+static double pendulum_remaining(double size, double bend, double bound)
+{
+    const double growth = size / bound, left = size * (size + bend);
+    return growth > 1.0 ? growth * left : left;
+}
+
+/* The table of a stage, with its matrices or with those of the last pass. */
+static void pendulum_update(pendulum_lanes coef[restrict], pendulum_lines *line, int matrices)
+{
+    if (matrices)
+        pendulum_tabulate(coef, line);
+    else
+        pendulum_evaluate_lanes(coef, line->y, line->displacement, line->increment);
+}
+
 /* The steps of a block one after the other, each along the lines of its lane. As X, the state with its carry, gains
    increment - gain residual, the next residual follows from this one; X itself is added up apart. */
 static void pendulum_chain(pendulum_lines line[1], double x[2], double carry[2])
@@ -612,8 +653,9 @@ static void pendulum_foresee(const pendulum_memory *memory, pendulum_lanes weigh
     }
 }
 
-/* Guesses where no recurrence is known: midpoints of steps by the classical Runge-Kutta method. */
-static void pendulum_march(const pendulum_solver *s, pendulum_lines line[1])
+/* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
+   method, to leading order. */
+static void pendulum_march(const pendulum_solver *s, pendulum_table *table, pendulum_lines line[1])
 {
     static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
     double x[2], point[2], slope[2], mean[2];
@@ -634,6 +676,15 @@ static void pendulum_march(const pendulum_solver *s, pendulum_lines line[1])
             x[i] += h * mean[i];
         }
     }
+    for (int stage = 0; stage < 1; ++stage) {
+        pendulum_lines *at = &line[stage];
+        pendulum_evaluate_lanes(table->coef[stage], at->y, at->displacement, at->increment);
+        for (int i = 0; i < 2; ++i) {
+            pendulum_EACH_LANE
+            for (int lane = 0; lane < pendulum_LANES; ++lane)
+                at->y[i][lane] -= at->displacement[i][lane] + 0.5 * at->increment[i][lane];
+        }
+    }
 }
 
 /* pendulum_LANES steps at once: guess the points of all, and correct them together until the error that remains is as
@@ -642,14 +693,15 @@ static int pendulum_block(pendulum_solver *s, pendulum_table *table, int most)
 {
     pendulum_lines line[1];
     pendulum_lanes sizes;
-    double x[2], carry[2], value[2], previous = HUGE_VAL;
+    double x[2], carry[2], value[2], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
-    if (!s->foreseeing) pendulum_march(s, line);
+    if (!s->foreseeing) pendulum_march(s, table, line);
     for (int stage = 0; stage < 1 && s->foreseeing; ++stage)
         pendulum_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
     while (!solved) {
         double size = 0.0;
-        for (int stage = 0; stage < 1; ++stage) pendulum_tabulate(table->coef[stage], &line[stage]);
+        const int matrices = previous > 1e-05;
+        for (int stage = 0; stage < 1; ++stage) pendulum_update(table->coef[stage], &line[stage], matrices);
         memcpy(x, s->x, sizeof x);
         memcpy(carry, s->carry, sizeof carry);
         pendulum_chain(line, x, carry);
@@ -658,9 +710,10 @@ static int pendulum_block(pendulum_solver *s, pendulum_table *table, int most)
             size = fmax(size, pendulum_largest(sizes));
         }
         s->evaluations += 1 * pendulum_LANES;
-        const double growth = size / (previous * previous);
+        bend = matrices ? 0.0 : bend + previous;
+        bound = pendulum_remaining(size, bend, bound);
         /* The second test: after the square of so small a correction there is rounding only. */
-        solved = size * size * (growth > 1.0 ? growth : 1.0) <= 1e-20 || (previous < 1e-8 && size < 1e-10);
+        solved = bound <= 1e-20 || (previous < 1e-8 && size < 1e-10);
         if ((++passes >= most || !(size < previous)) && !solved) return 0;
         previous = size;
     }
@@ -690,26 +743,28 @@ static void pendulum_choose_guess(pendulum_solver *s, size_t steps)
             s->foreseeing = 0;
             return;
         }
-    if (s->foreseeing || (steps < 4000 && s->steps < 4000) || s->steps < s->retry) return;
+    if (s->foreseeing || (steps < 4000 && s->steps < 1000) || s->steps < s->retry) return;
     for (int stage = 0; stage < 1; ++stage) pendulum_fit(&s->memory[stage]);
     s->foreseeing = 1;
     s->pause = pendulum_LANES;
 }
 
-/* Learn from a block: recurrences that guess no better than steps by Runge-Kutta are given up for a while, and so are
-   blocks that fail with those. */
+/* Learn from a block: after one that failed single steps are made, the more the more often that happens. Recurrences
+   that fail repeatedly, or need more passes than steps by Runge-Kutta did, are given up for a while. */
 static void pendulum_learn_from(pendulum_solver *s, int passes)
 {
-    if (s->foreseeing && (passes == 0 || (passes > 1 && passes >= s->passes))) {
-        s->foreseeing = 0;
-        s->doubt = 2 * s->doubt + 4000;
-        s->retry = s->steps + s->doubt;
-    } else if (passes == 0) {
+    if (passes > 0) {
+        s->setback /= 2;
+    } else {
         s->setback = 2 * s->setback + pendulum_LANES > 1000 ? 1000 : 2 * s->setback + pendulum_LANES;
         s->pause = s->setback;
-    } else {
-        s->setback /= 2;
-        if (!s->foreseeing) s->passes = passes;
+    }
+    if (!s->foreseeing) {
+        s->passes = passes > 0 ? passes : INT_MAX;
+    } else if (passes > s->passes || s->setback > 5 * pendulum_LANES) {
+        s->foreseeing = s->setback = s->pause = 0;
+        s->doubt = 2 * s->doubt + 4000;
+        s->retry = s->steps + s->doubt;
     }
 }
 
@@ -858,14 +913,15 @@ static void pendulum_group_fit(pendulum_group *group)
     group->patience = group->patience < 10000 ? 2 * group->patience + 1000 : 20000;
 }
 
-/* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group. */
-static int pendulum_group_open(pendulum_group *group, const pendulum_lanes size, const pendulum_lanes previous)
+/* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group.
+   bound is what remains in each lane. */
+static int pendulum_group_open(pendulum_group *group, const pendulum_lanes size, const pendulum_lanes previous,
+    double bend, pendulum_lanes bound)
 {
     int open = 0;
     for (int lane = 0; lane < pendulum_LANES; ++lane) {
-        const double growth = size[lane] / (previous[lane] * previous[lane]);
-        const double remaining = size[lane] * size[lane] * (growth > 1.0 ? growth : 1.0);
-        const int solved = remaining <= 1e-20 || (previous[lane] < 1e-8 && size[lane] < 1e-10);
+        bound[lane] = pendulum_remaining(size[lane], bend, bound[lane]);
+        const int solved = bound[lane] <= 1e-20 || (previous[lane] < 1e-8 && size[lane] < 1e-10);
         if (!isfinite(size[lane])) group->active[lane] = 0;
         open += group->active[lane] && !solved;
     }
@@ -876,14 +932,16 @@ static int pendulum_group_open(pendulum_group *group, const pendulum_lanes size,
    allowed, lanes that are not solved leave the group. */
 static int pendulum_group_solve(pendulum_group *group, int stage, pendulum_lines *line)
 {
-    pendulum_lanes size, previous;
+    pendulum_lanes size, previous, bound;
+    double largest = HUGE_VAL, bend = 0.0;
     int iterations = 0, open = 1;
-    for (int lane = 0; lane < pendulum_LANES; ++lane) size[lane] = HUGE_VAL;
+    for (int lane = 0; lane < pendulum_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
     if (group->fitting[stage]) pendulum_group_foresee(group, stage, line->y);
     else pendulum_group_extrapolate(group, stage, line->y);
     for (; open > 0 && iterations < 20; ++iterations) {
         memcpy(previous, size, sizeof size);
-        pendulum_tabulate(group->coef[stage], line);
+        pendulum_update(group->coef[stage], line, largest > 1e-05);
+        bend = largest > 1e-05 ? 0.0 : bend + largest;
         for (int i = 0; i < 2; ++i) {
             pendulum_EACH_LANE
             for (int lane = 0; lane < pendulum_LANES; ++lane)
@@ -891,10 +949,11 @@ static int pendulum_group_solve(pendulum_group *group, int stage, pendulum_lines
                     ((line->y[i][lane] - group->x[i][lane]) + line->displacement[i][lane]) - group->carry[i][lane];
         }
         pendulum_correct(line, size);
-        open = pendulum_group_open(group, size, previous);
+        open = pendulum_group_open(group, size, previous, bend, bound);
+        largest = pendulum_largest(size);
     }
     for (int lane = 0; lane < pendulum_LANES && open > 0; ++lane)
-        group->active[lane] = group->active[lane] && size[lane] * size[lane] <= 1e-20;
+        group->active[lane] = group->active[lane] && bound[lane] <= 1e-20;
     return iterations;
 }
 

@@ -13,11 +13,12 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: a8672a66435c70007382fe147697e616ee44f279d36057d38f87f201ddac1f14
+ * body-sha256: 71b7f66dac42902445fe5f2c37d92348d3e6d5fc16177e4b4d5e611addbde9ee
  */
 #include "pendulum_euler.h"
 
 #include <float.h>
+#include <limits.h>
 #include <math.h>
 #include <stdint.h>
 #include <string.h>

@@ -13,11 +13,12 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 2c6dfe71ac9d82b0e5b160733445e5ed7dfd575daec7a7a3a6cd43eda979bc30
+ * body-sha256: b6a0d12fd5c6cbb15bc113b7d1256733f336edb1993d52f259569bc3568f970a
  */
 #include "poisson_not_hamiltonian.h"
 
 #include <float.h>
+#include <limits.h>
 #include <math.h>
 #include <stdint.h>
 #include <string.h>
@@ -486,6 +487,7 @@ static poisson_not_hamiltonian_status poisson_not_hamiltonian_set_step(poisson_n
     s->setback = s->foreseeing = 0;
     s->doubt = s->retry = 0;
     s->effort = 0.0;
+    s->passes = INT_MAX;
     s->h = h;
     s->ready = 1;
     return poisson_not_hamiltonian_OK;
@@ -722,6 +724,51 @@ static void poisson_not_hamiltonian_linearise_lanes(poisson_not_hamiltonian_lane
     }
 }
 
+/* poisson_not_hamiltonian_evaluate in all lanes. */
+static void poisson_not_hamiltonian_evaluate_lanes(poisson_not_hamiltonian_lanes coef[restrict 2],
+                                                   poisson_not_hamiltonian_lanes y[restrict 3],
+                                                   poisson_not_hamiltonian_lanes displacement[restrict 3],
+                                                   poisson_not_hamiltonian_lanes increment[restrict 3])
+{
+    poisson_not_hamiltonian_EACH_LANE
+    for (int lane = 0; lane < poisson_not_hamiltonian_LANES; ++lane) {
+        const double x = y[0][lane];
+        const double y_ = y[1][lane];
+        const double z = y[2][lane];
+        const double t1 = y_ - z;
+        const double p_z = coef[1][lane] * y_ + coef[0][lane] * z;
+        const double p_y = coef[1][lane] * z + coef[0][lane] * y_;
+        const double p_x = coef[0][lane] * x;
+        const double t2 = p_z + (p_y + 2.0 * p_x);
+        const double t3 = t1 * t2;
+        const double t4 = p_y - p_z;
+        const double t5 = x * t4;
+        const double t6 = poisson_not_hamiltonian_exp_lane(0.25 * (t3 - t5));
+        const double t7 = 0.25 * (t1 * t4 + x * t2);
+        const double t8 = cos(t7);
+        const double t9 = x * t8;
+        const double t10 = sin(t7);
+        const double t11 = t1 * t10;
+        const double t12 = t6 * (t9 - t11);
+        const double t13 = 0.5 * (y_ + z - x);
+        const double t14 = x + t1;
+        const double t15 = t14 * t8;
+        const double t16 = x - t1;
+        const double t17 = t16 * t10;
+        const double t18 = t13 + 0.5 * (t6 * (t15 + t17));
+        const double t19 = t16 * t8;
+        const double t20 = t14 * t10;
+        const double t21 = t13 + 0.5 * (t6 * (t19 - t20));
+        const double t22 = poisson_not_hamiltonian_exp_lane(0.25 * (t5 - t3));
+        displacement[0][lane] = t12 - x;
+        displacement[1][lane] = t18 - y_;
+        displacement[2][lane] = t21 - z;
+        increment[0][lane] = t22 * (t9 + t11) - t12;
+        increment[1][lane] = t13 + 0.5 * (t22 * (t15 - t17)) - t18;
+        increment[2][lane] = t13 + 0.5 * (t22 * (t19 + t20)) - t21;
+    }
+}
+
 /* poisson_not_hamiltonian_invert in all lanes. */
 static void poisson_not_hamiltonian_invert_lanes(poisson_not_hamiltonian_lanes matrix[restrict 9],
                                                  poisson_not_hamiltonian_lanes slope[restrict 9],
@@ -828,6 +875,23 @@ static double poisson_not_hamiltonian_largest(const poisson_not_hamiltonian_lane
     return isfinite(total) ? largest : HUGE_VAL;
 }
 
+/* What is left after a correction of this size: quadratic in it, where the matrices are of the points corrected; where
+   they are of points further off, by bend, also of the order of size times bend. bound is what the last pass left. */
+static double poisson_not_hamiltonian_remaining(double size, double bend, double bound)
+{
+    const double growth = size / bound, left = size * (size + bend);
+    return growth > 1.0 ? growth * left : left;
+}
+
+/* The table of a stage, with its matrices or with those of the last pass. */
+static void poisson_not_hamiltonian_update(poisson_not_hamiltonian_lanes coef[restrict], poisson_not_hamiltonian_lines *line, int matrices)
+{
+    if (matrices)
+        poisson_not_hamiltonian_tabulate(coef, line);
+    else
+        poisson_not_hamiltonian_evaluate_lanes(coef, line->y, line->displacement, line->increment);
+}
+
 /* The steps of a block one after the other, each along the lines of its lane. As X, the state with its carry, gains
    increment - gain residual, the next residual follows from this one; X itself is added up apart. */
 static void poisson_not_hamiltonian_chain(poisson_not_hamiltonian_lines line[1], double x[3], double carry[3])
@@ -890,8 +954,9 @@ static void poisson_not_hamiltonian_foresee(const poisson_not_hamiltonian_memory
     }
 }
 
-/* Guesses where no recurrence is known: midpoints of steps by the classical Runge-Kutta method. */
-static void poisson_not_hamiltonian_march(const poisson_not_hamiltonian_solver *s, poisson_not_hamiltonian_lines line[1])
+/* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
+   method, to leading order. */
+static void poisson_not_hamiltonian_march(const poisson_not_hamiltonian_solver *s, poisson_not_hamiltonian_table *table, poisson_not_hamiltonian_lines line[1])
 {
     static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
     double x[3], point[3], slope[3], mean[3];
@@ -912,6 +977,15 @@ static void poisson_not_hamiltonian_march(const poisson_not_hamiltonian_solver *
             x[i] += h * mean[i];
         }
     }
+    for (int stage = 0; stage < 1; ++stage) {
+        poisson_not_hamiltonian_lines *at = &line[stage];
+        poisson_not_hamiltonian_evaluate_lanes(table->coef[stage], at->y, at->displacement, at->increment);
+        for (int i = 0; i < 3; ++i) {
+            poisson_not_hamiltonian_EACH_LANE
+            for (int lane = 0; lane < poisson_not_hamiltonian_LANES; ++lane)
+                at->y[i][lane] -= at->displacement[i][lane] + 0.5 * at->increment[i][lane];
+        }
+    }
 }
 
 /* poisson_not_hamiltonian_LANES steps at once: guess the points of all, and correct them together until the error that remains is as
@@ -920,14 +994,15 @@ static int poisson_not_hamiltonian_block(poisson_not_hamiltonian_solver *s, pois
 {
     poisson_not_hamiltonian_lines line[1];
     poisson_not_hamiltonian_lanes sizes;
-    double x[3], carry[3], value[3], previous = HUGE_VAL;
+    double x[3], carry[3], value[3], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
-    if (!s->foreseeing) poisson_not_hamiltonian_march(s, line);
+    if (!s->foreseeing) poisson_not_hamiltonian_march(s, table, line);
     for (int stage = 0; stage < 1 && s->foreseeing; ++stage)
         poisson_not_hamiltonian_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
     while (!solved) {
         double size = 0.0;
-        for (int stage = 0; stage < 1; ++stage) poisson_not_hamiltonian_tabulate(table->coef[stage], &line[stage]);
+        const int matrices = previous > 1e-05;
+        for (int stage = 0; stage < 1; ++stage) poisson_not_hamiltonian_update(table->coef[stage], &line[stage], matrices);
         memcpy(x, s->x, sizeof x);
         memcpy(carry, s->carry, sizeof carry);
         poisson_not_hamiltonian_chain(line, x, carry);
@@ -936,9 +1011,10 @@ static int poisson_not_hamiltonian_block(poisson_not_hamiltonian_solver *s, pois
             size = fmax(size, poisson_not_hamiltonian_largest(sizes));
         }
         s->evaluations += 1 * poisson_not_hamiltonian_LANES;
-        const double growth = size / (previous * previous);
+        bend = matrices ? 0.0 : bend + previous;
+        bound = poisson_not_hamiltonian_remaining(size, bend, bound);
         /* The second test: after the square of so small a correction there is rounding only. */
-        solved = size * size * (growth > 1.0 ? growth : 1.0) <= 1e-20 || (previous < 1e-8 && size < 1e-10);
+        solved = bound <= 1e-20 || (previous < 1e-8 && size < 1e-10);
         if ((++passes >= most || !(size < previous)) && !solved) return 0;
         previous = size;
     }
@@ -968,26 +1044,28 @@ static void poisson_not_hamiltonian_choose_guess(poisson_not_hamiltonian_solver 
             s->foreseeing = 0;
             return;
         }
-    if (s->foreseeing || (steps < 4000 && s->steps < 4000) || s->steps < s->retry) return;
+    if (s->foreseeing || (steps < 4000 && s->steps < 1000) || s->steps < s->retry) return;
     for (int stage = 0; stage < 1; ++stage) poisson_not_hamiltonian_fit(&s->memory[stage]);
     s->foreseeing = 1;
     s->pause = poisson_not_hamiltonian_LANES;
 }
 
-/* Learn from a block: recurrences that guess no better than steps by Runge-Kutta are given up for a while, and so are
-   blocks that fail with those. */
+/* Learn from a block: after one that failed single steps are made, the more the more often that happens. Recurrences
+   that fail repeatedly, or need more passes than steps by Runge-Kutta did, are given up for a while. */
 static void poisson_not_hamiltonian_learn_from(poisson_not_hamiltonian_solver *s, int passes)
 {
-    if (s->foreseeing && (passes == 0 || (passes > 1 && passes >= s->passes))) {
-        s->foreseeing = 0;
-        s->doubt = 2 * s->doubt + 4000;
-        s->retry = s->steps + s->doubt;
-    } else if (passes == 0) {
+    if (passes > 0) {
+        s->setback /= 2;
+    } else {
         s->setback = 2 * s->setback + poisson_not_hamiltonian_LANES > 1000 ? 1000 : 2 * s->setback + poisson_not_hamiltonian_LANES;
         s->pause = s->setback;
-    } else {
-        s->setback /= 2;
-        if (!s->foreseeing) s->passes = passes;
+    }
+    if (!s->foreseeing) {
+        s->passes = passes > 0 ? passes : INT_MAX;
+    } else if (passes > s->passes || s->setback > 5 * poisson_not_hamiltonian_LANES) {
+        s->foreseeing = s->setback = s->pause = 0;
+        s->doubt = 2 * s->doubt + 4000;
+        s->retry = s->steps + s->doubt;
     }
 }
 
@@ -1136,14 +1214,15 @@ static void poisson_not_hamiltonian_group_fit(poisson_not_hamiltonian_group *gro
     group->patience = group->patience < 10000 ? 2 * group->patience + 1000 : 20000;
 }
 
-/* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group. */
-static int poisson_not_hamiltonian_group_open(poisson_not_hamiltonian_group *group, const poisson_not_hamiltonian_lanes size, const poisson_not_hamiltonian_lanes previous)
+/* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group.
+   bound is what remains in each lane. */
+static int poisson_not_hamiltonian_group_open(poisson_not_hamiltonian_group *group, const poisson_not_hamiltonian_lanes size, const poisson_not_hamiltonian_lanes previous,
+    double bend, poisson_not_hamiltonian_lanes bound)
 {
     int open = 0;
     for (int lane = 0; lane < poisson_not_hamiltonian_LANES; ++lane) {
-        const double growth = size[lane] / (previous[lane] * previous[lane]);
-        const double remaining = size[lane] * size[lane] * (growth > 1.0 ? growth : 1.0);
-        const int solved = remaining <= 1e-20 || (previous[lane] < 1e-8 && size[lane] < 1e-10);
+        bound[lane] = poisson_not_hamiltonian_remaining(size[lane], bend, bound[lane]);
+        const int solved = bound[lane] <= 1e-20 || (previous[lane] < 1e-8 && size[lane] < 1e-10);
         if (!isfinite(size[lane])) group->active[lane] = 0;
         open += group->active[lane] && !solved;
     }
@@ -1154,14 +1233,16 @@ static int poisson_not_hamiltonian_group_open(poisson_not_hamiltonian_group *gro
    allowed, lanes that are not solved leave the group. */
 static int poisson_not_hamiltonian_group_solve(poisson_not_hamiltonian_group *group, int stage, poisson_not_hamiltonian_lines *line)
 {
-    poisson_not_hamiltonian_lanes size, previous;
+    poisson_not_hamiltonian_lanes size, previous, bound;
+    double largest = HUGE_VAL, bend = 0.0;
     int iterations = 0, open = 1;
-    for (int lane = 0; lane < poisson_not_hamiltonian_LANES; ++lane) size[lane] = HUGE_VAL;
+    for (int lane = 0; lane < poisson_not_hamiltonian_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
     if (group->fitting[stage]) poisson_not_hamiltonian_group_foresee(group, stage, line->y);
     else poisson_not_hamiltonian_group_extrapolate(group, stage, line->y);
     for (; open > 0 && iterations < 20; ++iterations) {
         memcpy(previous, size, sizeof size);
-        poisson_not_hamiltonian_tabulate(group->coef[stage], line);
+        poisson_not_hamiltonian_update(group->coef[stage], line, largest > 1e-05);
+        bend = largest > 1e-05 ? 0.0 : bend + largest;
         for (int i = 0; i < 3; ++i) {
             poisson_not_hamiltonian_EACH_LANE
             for (int lane = 0; lane < poisson_not_hamiltonian_LANES; ++lane)
@@ -1169,10 +1250,11 @@ static int poisson_not_hamiltonian_group_solve(poisson_not_hamiltonian_group *gr
                     ((line->y[i][lane] - group->x[i][lane]) + line->displacement[i][lane]) - group->carry[i][lane];
         }
         poisson_not_hamiltonian_correct(line, size);
-        open = poisson_not_hamiltonian_group_open(group, size, previous);
+        open = poisson_not_hamiltonian_group_open(group, size, previous, bend, bound);
+        largest = poisson_not_hamiltonian_largest(size);
     }
     for (int lane = 0; lane < poisson_not_hamiltonian_LANES && open > 0; ++lane)
-        group->active[lane] = group->active[lane] && size[lane] * size[lane] <= 1e-20;
+        group->active[lane] = group->active[lane] && bound[lane] <= 1e-20;
     return iterations;
 }
 

@@ -13,11 +13,12 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 712eb451fd7b34d1a1b1a7521f0de252d4f2cc1706f86a3cc4527a3857e20aa4
+ * body-sha256: 2775946883d747c0dbc8c17cd823b6a11c8e4d771989394028a9321030ff09c2
  */
 #include "predator_prey.h"
 
 #include <float.h>
+#include <limits.h>
 #include <math.h>
 #include <stdint.h>
 #include <string.h>
@@ -382,6 +383,7 @@ static predator_prey_status predator_prey_set_step(predator_prey_solver *s, doub
     s->setback = s->foreseeing = 0;
     s->doubt = s->retry = 0;
     s->effort = 0.0;
+    s->passes = INT_MAX;
     s->h = h;
     s->ready = 1;
     return predator_prey_OK;
@@ -512,6 +514,27 @@ static void predator_prey_linearise_lanes(predator_prey_lanes coef[restrict 11],
     }
 }
 
+/* predator_prey_evaluate in all lanes. */
+static void predator_prey_evaluate_lanes(predator_prey_lanes coef[restrict 11],
+                                         predator_prey_lanes y[restrict 2],
+                                         predator_prey_lanes displacement[restrict 2],
+                                         predator_prey_lanes increment[restrict 2])
+{
+    predator_prey_EACH_LANE
+    for (int lane = 0; lane < predator_prey_LANES; ++lane) {
+        const double prey = y[0][lane];
+        const double predator = y[1][lane];
+        const double p_predator = coef[6][lane] + coef[5][lane] / predator + prey * (coef[7][lane] * predator + (coef[2][lane] + coef[8][lane] * prey));
+        const double t1 = predator_prey_expm1_lane((-0.5) * (predator * p_predator));
+        const double p_prey = coef[1][lane] + coef[0][lane] / prey + predator * (coef[3][lane] * predator + (coef[2][lane] + coef[4][lane] * prey));
+        const double t2 = predator_prey_expm1_lane(0.5 * (prey * p_prey));
+        displacement[0][lane] = prey * t1;
+        displacement[1][lane] = predator * t2;
+        increment[0][lane] = -(prey * (t1 * (1.0 + 1.0 / (1.0 + t1))));
+        increment[1][lane] = -(predator * (t2 * (1.0 + 1.0 / (1.0 + t2))));
+    }
+}
+
 /* predator_prey_invert in all lanes. */
 static void predator_prey_invert_lanes(predator_prey_lanes matrix[restrict 4],
                                        predator_prey_lanes slope[restrict 4],
@@ -596,6 +619,23 @@ static double predator_prey_largest(const predator_prey_lanes size)
     return isfinite(total) ? largest : HUGE_VAL;
 }
 
+/* What is left after a correction of this size: quadratic in it, where the matrices are of the points corrected; where
+   they are of points further off, by bend, also of the order of size times bend. bound is what the last pass left. */
+static double predator_prey_remaining(double size, double bend, double bound)
+{
+    const double growth = size / bound, left = size * (size + bend);
+    return growth > 1.0 ? growth * left : left;
+}
+
+/* The table of a stage, with its matrices or with those of the last pass. */
+static void predator_prey_update(predator_prey_lanes coef[restrict], predator_prey_lines *line, int matrices)
+{
+    if (matrices)
+        predator_prey_tabulate(coef, line);
+    else
+        predator_prey_evaluate_lanes(coef, line->y, line->displacement, line->increment);
+}
+
 /* The steps of a block one after the other, each along the lines of its lane. As X, the state with its carry, gains
    increment - gain residual, the next residual follows from this one; X itself is added up apart. */
 static void predator_prey_chain(predator_prey_lines line[1], double x[2], double carry[2])
@@ -658,8 +698,9 @@ static void predator_prey_foresee(const predator_prey_memory *memory, predator_p
     }
 }
 
-/* Guesses where no recurrence is known: midpoints of steps by the classical Runge-Kutta method. */
-static void predator_prey_march(const predator_prey_solver *s, predator_prey_lines line[1])
+/* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
+   method, to leading order. */
+static void predator_prey_march(const predator_prey_solver *s, predator_prey_table *table, predator_prey_lines line[1])
 {
     static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
     double x[2], point[2], slope[2], mean[2];
@@ -680,6 +721,15 @@ static void predator_prey_march(const predator_prey_solver *s, predator_prey_lin
             x[i] += h * mean[i];
         }
     }
+    for (int stage = 0; stage < 1; ++stage) {
+        predator_prey_lines *at = &line[stage];
+        predator_prey_evaluate_lanes(table->coef[stage], at->y, at->displacement, at->increment);
+        for (int i = 0; i < 2; ++i) {
+            predator_prey_EACH_LANE
+            for (int lane = 0; lane < predator_prey_LANES; ++lane)
+                at->y[i][lane] -= at->displacement[i][lane] + 0.5 * at->increment[i][lane];
+        }
+    }
 }
 
 /* predator_prey_LANES steps at once: guess the points of all, and correct them together until the error that remains is as
@@ -688,14 +738,15 @@ static int predator_prey_block(predator_prey_solver *s, predator_prey_table *tab
 {
     predator_prey_lines line[1];
     predator_prey_lanes sizes;
-    double x[2], carry[2], value[2], previous = HUGE_VAL;
+    double x[2], carry[2], value[2], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
-    if (!s->foreseeing) predator_prey_march(s, line);
+    if (!s->foreseeing) predator_prey_march(s, table, line);
     for (int stage = 0; stage < 1 && s->foreseeing; ++stage)
         predator_prey_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
     while (!solved) {
         double size = 0.0;
-        for (int stage = 0; stage < 1; ++stage) predator_prey_tabulate(table->coef[stage], &line[stage]);
+        const int matrices = previous > 1e-05;
+        for (int stage = 0; stage < 1; ++stage) predator_prey_update(table->coef[stage], &line[stage], matrices);
         memcpy(x, s->x, sizeof x);
         memcpy(carry, s->carry, sizeof carry);
         predator_prey_chain(line, x, carry);
@@ -704,9 +755,10 @@ static int predator_prey_block(predator_prey_solver *s, predator_prey_table *tab
             size = fmax(size, predator_prey_largest(sizes));
         }
         s->evaluations += 1 * predator_prey_LANES;
-        const double growth = size / (previous * previous);
+        bend = matrices ? 0.0 : bend + previous;
+        bound = predator_prey_remaining(size, bend, bound);
         /* The second test: after the square of so small a correction there is rounding only. */
-        solved = size * size * (growth > 1.0 ? growth : 1.0) <= 1e-20 || (previous < 1e-8 && size < 1e-10);
+        solved = bound <= 1e-20 || (previous < 1e-8 && size < 1e-10);
         if ((++passes >= most || !(size < previous)) && !solved) return 0;
         previous = size;
     }
@@ -736,26 +788,28 @@ static void predator_prey_choose_guess(predator_prey_solver *s, size_t steps)
             s->foreseeing = 0;
             return;
         }
-    if (s->foreseeing || (steps < 4000 && s->steps < 4000) || s->steps < s->retry) return;
+    if (s->foreseeing || (steps < 4000 && s->steps < 1000) || s->steps < s->retry) return;
     for (int stage = 0; stage < 1; ++stage) predator_prey_fit(&s->memory[stage]);
     s->foreseeing = 1;
     s->pause = predator_prey_LANES;
 }
 
-/* Learn from a block: recurrences that guess no better than steps by Runge-Kutta are given up for a while, and so are
-   blocks that fail with those. */
+/* Learn from a block: after one that failed single steps are made, the more the more often that happens. Recurrences
+   that fail repeatedly, or need more passes than steps by Runge-Kutta did, are given up for a while. */
 static void predator_prey_learn_from(predator_prey_solver *s, int passes)
 {
-    if (s->foreseeing && (passes == 0 || (passes > 1 && passes >= s->passes))) {
-        s->foreseeing = 0;
-        s->doubt = 2 * s->doubt + 4000;
-        s->retry = s->steps + s->doubt;
-    } else if (passes == 0) {
+    if (passes > 0) {
+        s->setback /= 2;
+    } else {
         s->setback = 2 * s->setback + predator_prey_LANES > 1000 ? 1000 : 2 * s->setback + predator_prey_LANES;
         s->pause = s->setback;
-    } else {
-        s->setback /= 2;
-        if (!s->foreseeing) s->passes = passes;
+    }
+    if (!s->foreseeing) {
+        s->passes = passes > 0 ? passes : INT_MAX;
+    } else if (passes > s->passes || s->setback > 5 * predator_prey_LANES) {
+        s->foreseeing = s->setback = s->pause = 0;
+        s->doubt = 2 * s->doubt + 4000;
+        s->retry = s->steps + s->doubt;
     }
 }
 
@@ -904,14 +958,15 @@ static void predator_prey_group_fit(predator_prey_group *group)
     group->patience = group->patience < 10000 ? 2 * group->patience + 1000 : 20000;
 }
 
-/* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group. */
-static int predator_prey_group_open(predator_prey_group *group, const predator_prey_lanes size, const predator_prey_lanes previous)
+/* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group.
+   bound is what remains in each lane. */
+static int predator_prey_group_open(predator_prey_group *group, const predator_prey_lanes size, const predator_prey_lanes previous,
+    double bend, predator_prey_lanes bound)
 {
     int open = 0;
     for (int lane = 0; lane < predator_prey_LANES; ++lane) {
-        const double growth = size[lane] / (previous[lane] * previous[lane]);
-        const double remaining = size[lane] * size[lane] * (growth > 1.0 ? growth : 1.0);
-        const int solved = remaining <= 1e-20 || (previous[lane] < 1e-8 && size[lane] < 1e-10);
+        bound[lane] = predator_prey_remaining(size[lane], bend, bound[lane]);
+        const int solved = bound[lane] <= 1e-20 || (previous[lane] < 1e-8 && size[lane] < 1e-10);
         if (!isfinite(size[lane])) group->active[lane] = 0;
         open += group->active[lane] && !solved;
     }
@@ -922,14 +977,16 @@ static int predator_prey_group_open(predator_prey_group *group, const predator_p
    allowed, lanes that are not solved leave the group. */
 static int predator_prey_group_solve(predator_prey_group *group, int stage, predator_prey_lines *line)
 {
-    predator_prey_lanes size, previous;
+    predator_prey_lanes size, previous, bound;
+    double largest = HUGE_VAL, bend = 0.0;
     int iterations = 0, open = 1;
-    for (int lane = 0; lane < predator_prey_LANES; ++lane) size[lane] = HUGE_VAL;
+    for (int lane = 0; lane < predator_prey_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
     if (group->fitting[stage]) predator_prey_group_foresee(group, stage, line->y);
     else predator_prey_group_extrapolate(group, stage, line->y);
     for (; open > 0 && iterations < 20; ++iterations) {
         memcpy(previous, size, sizeof size);
-        predator_prey_tabulate(group->coef[stage], line);
+        predator_prey_update(group->coef[stage], line, largest > 1e-05);
+        bend = largest > 1e-05 ? 0.0 : bend + largest;
         for (int i = 0; i < 2; ++i) {
             predator_prey_EACH_LANE
             for (int lane = 0; lane < predator_prey_LANES; ++lane)
@@ -937,10 +994,11 @@ static int predator_prey_group_solve(predator_prey_group *group, int stage, pred
                     ((line->y[i][lane] - group->x[i][lane]) + line->displacement[i][lane]) - group->carry[i][lane];
         }
         predator_prey_correct(line, size);
-        open = predator_prey_group_open(group, size, previous);
+        open = predator_prey_group_open(group, size, previous, bend, bound);
+        largest = predator_prey_largest(size);
     }
     for (int lane = 0; lane < predator_prey_LANES && open > 0; ++lane)
-        group->active[lane] = group->active[lane] && size[lane] * size[lane] <= 1e-20;
+        group->active[lane] = group->active[lane] && bound[lane] <= 1e-20;
     return iterations;
 }
 

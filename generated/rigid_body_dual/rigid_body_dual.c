@@ -14,11 +14,12 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 0c634fae4e03e2f4a036700a7cef5c3d2cb4d98d5a663058cd3ab59508fd75c3
+ * body-sha256: fc82ef5881f597c482ef39cb4ffdabefc28f1ec1f2055350d5a015a5b75c6e1f
  */
 #include "rigid_body_dual.h"
 
 #include <float.h>
+#include <limits.h>
 #include <math.h>
 #include <stdint.h>
 #include <string.h>
@@ -680,6 +681,7 @@ static rigid_body_dual_status rigid_body_dual_set_step(rigid_body_dual_solver *s
     s->setback = s->foreseeing = 0;
     s->doubt = s->retry = 0;
     s->effort = 0.0;
+    s->passes = INT_MAX;
     s->h = h;
     s->ready = 1;
     return rigid_body_dual_OK;
@@ -871,6 +873,48 @@ static void rigid_body_dual_linearise_lanes(rigid_body_dual_lanes coef[restrict 
     }
 }
 
+/* rigid_body_dual_evaluate in all lanes. */
+static void rigid_body_dual_evaluate_lanes(rigid_body_dual_lanes coef[restrict 12],
+                                           rigid_body_dual_lanes y[restrict 3],
+                                           rigid_body_dual_lanes displacement[restrict 3],
+                                           rigid_body_dual_lanes increment[restrict 3])
+{
+    rigid_body_dual_EACH_LANE
+    for (int lane = 0; lane < rigid_body_dual_LANES; ++lane) {
+        const double x1 = y[0][lane];
+        const double x2 = y[1][lane];
+        const double x3 = y[2][lane];
+        const double t1 = x2 * x2;
+        const double t2 = x1 * x1;
+        const double p_x3 = x3 * (coef[4][lane] * t1 + (coef[5][lane] + coef[1][lane] * t2));
+        const double t3 = coef[9][lane] * p_x3;
+        const double t4 = x3 * x3;
+        const double p_x1 = x1 * (coef[1][lane] * t4 + (coef[0][lane] + coef[2][lane] * t1));
+        const double t5 = coef[10][lane] * p_x1;
+        const double t6 = coef[11][lane] * p_x3;
+        const double t7 = x3 * t5 - x1 * t6;
+        const double p_x2 = x2 * (coef[4][lane] * t4 + (coef[3][lane] + coef[2][lane] * t2));
+        const double t8 = coef[10][lane] * p_x2;
+        const double t9 = coef[11][lane] * p_x2;
+        const double t10 = coef[9][lane] * p_x1;
+        const double t11 = x1 * t9 - x2 * t10;
+        const double t12 = rigid_body_dual_phi0_lane(coef[11][lane] * (coef[10][lane] * (p_x2 * p_x2)) + coef[9][lane] * (coef[10][lane] * (p_x1 * p_x1) + coef[11][lane] * (p_x3 * p_x3)));
+        const double t13 = coef[9][lane] * x2;
+        const double t14 = coef[10][lane] * x3;
+        const double t15 = t13 * p_x3 - t14 * p_x2;
+        const double t16 = x2 * t3 - x3 * t8;
+        const double t17 = coef[11][lane] * x1;
+        const double t18 = t14 * p_x1 - t17 * p_x3;
+        const double t19 = t17 * p_x2 - t13 * p_x1;
+        displacement[0][lane] = (t3 * t7 - t8 * t11) * t12 - 0.5 * t15;
+        displacement[1][lane] = (t5 * t11 - t6 * t16) * t12 - 0.5 * t18;
+        displacement[2][lane] = (t9 * t16 - t10 * t7) * t12 - 0.5 * t19;
+        increment[0][lane] = t15;
+        increment[1][lane] = t18;
+        increment[2][lane] = t19;
+    }
+}
+
 /* rigid_body_dual_invert in all lanes. */
 static void rigid_body_dual_invert_lanes(rigid_body_dual_lanes matrix[restrict 9],
                                          rigid_body_dual_lanes slope[restrict 9],
@@ -977,6 +1021,23 @@ static double rigid_body_dual_largest(const rigid_body_dual_lanes size)
     return isfinite(total) ? largest : HUGE_VAL;
 }
 
+/* What is left after a correction of this size: quadratic in it, where the matrices are of the points corrected; where
+   they are of points further off, by bend, also of the order of size times bend. bound is what the last pass left. */
+static double rigid_body_dual_remaining(double size, double bend, double bound)
+{
+    const double growth = size / bound, left = size * (size + bend);
+    return growth > 1.0 ? growth * left : left;
+}
+
+/* The table of a stage, with its matrices or with those of the last pass. */
+static void rigid_body_dual_update(rigid_body_dual_lanes coef[restrict], rigid_body_dual_lines *line, int matrices)
+{
+    if (matrices)
+        rigid_body_dual_tabulate(coef, line);
+    else
+        rigid_body_dual_evaluate_lanes(coef, line->y, line->displacement, line->increment);
+}
+
 /* The steps of a block one after the other, each along the lines of its lane. As X, the state with its carry, gains
    increment - gain residual, the next residual follows from this one; X itself is added up apart. */
 static void rigid_body_dual_chain(rigid_body_dual_lines line[1], double x[3], double carry[3])
@@ -1039,8 +1100,9 @@ static void rigid_body_dual_foresee(const rigid_body_dual_memory *memory, rigid_
     }
 }
 
-/* Guesses where no recurrence is known: midpoints of steps by the classical Runge-Kutta method. */
-static void rigid_body_dual_march(const rigid_body_dual_solver *s, rigid_body_dual_lines line[1])
+/* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
+   method, to leading order. */
+static void rigid_body_dual_march(const rigid_body_dual_solver *s, rigid_body_dual_table *table, rigid_body_dual_lines line[1])
 {
     static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
     double x[3], point[3], slope[3], mean[3];
@@ -1061,6 +1123,15 @@ static void rigid_body_dual_march(const rigid_body_dual_solver *s, rigid_body_du
             x[i] += h * mean[i];
         }
     }
+    for (int stage = 0; stage < 1; ++stage) {
+        rigid_body_dual_lines *at = &line[stage];
+        rigid_body_dual_evaluate_lanes(table->coef[stage], at->y, at->displacement, at->increment);
+        for (int i = 0; i < 3; ++i) {
+            rigid_body_dual_EACH_LANE
+            for (int lane = 0; lane < rigid_body_dual_LANES; ++lane)
+                at->y[i][lane] -= at->displacement[i][lane] + 0.5 * at->increment[i][lane];
+        }
+    }
 }
 
 /* rigid_body_dual_LANES steps at once: guess the points of all, and correct them together until the error that remains is as
@@ -1069,14 +1140,15 @@ static int rigid_body_dual_block(rigid_body_dual_solver *s, rigid_body_dual_tabl
 {
     rigid_body_dual_lines line[1];
     rigid_body_dual_lanes sizes;
-    double x[3], carry[3], value[3], previous = HUGE_VAL;
+    double x[3], carry[3], value[3], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
-    if (!s->foreseeing) rigid_body_dual_march(s, line);
+    if (!s->foreseeing) rigid_body_dual_march(s, table, line);
     for (int stage = 0; stage < 1 && s->foreseeing; ++stage)
         rigid_body_dual_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
     while (!solved) {
         double size = 0.0;
-        for (int stage = 0; stage < 1; ++stage) rigid_body_dual_tabulate(table->coef[stage], &line[stage]);
+        const int matrices = previous > 1e-05;
+        for (int stage = 0; stage < 1; ++stage) rigid_body_dual_update(table->coef[stage], &line[stage], matrices);
         memcpy(x, s->x, sizeof x);
         memcpy(carry, s->carry, sizeof carry);
         rigid_body_dual_chain(line, x, carry);
@@ -1085,9 +1157,10 @@ static int rigid_body_dual_block(rigid_body_dual_solver *s, rigid_body_dual_tabl
             size = fmax(size, rigid_body_dual_largest(sizes));
         }
         s->evaluations += 1 * rigid_body_dual_LANES;
-        const double growth = size / (previous * previous);
+        bend = matrices ? 0.0 : bend + previous;
+        bound = rigid_body_dual_remaining(size, bend, bound);
         /* The second test: after the square of so small a correction there is rounding only. */
-        solved = size * size * (growth > 1.0 ? growth : 1.0) <= 1e-20 || (previous < 1e-8 && size < 1e-10);
+        solved = bound <= 1e-20 || (previous < 1e-8 && size < 1e-10);
         if ((++passes >= most || !(size < previous)) && !solved) return 0;
         previous = size;
     }
@@ -1117,26 +1190,28 @@ static void rigid_body_dual_choose_guess(rigid_body_dual_solver *s, size_t steps
             s->foreseeing = 0;
             return;
         }
-    if (s->foreseeing || (steps < 4000 && s->steps < 4000) || s->steps < s->retry) return;
+    if (s->foreseeing || (steps < 4000 && s->steps < 1000) || s->steps < s->retry) return;
     for (int stage = 0; stage < 1; ++stage) rigid_body_dual_fit(&s->memory[stage]);
     s->foreseeing = 1;
     s->pause = rigid_body_dual_LANES;
 }
 
-/* Learn from a block: recurrences that guess no better than steps by Runge-Kutta are given up for a while, and so are
-   blocks that fail with those. */
+/* Learn from a block: after one that failed single steps are made, the more the more often that happens. Recurrences
+   that fail repeatedly, or need more passes than steps by Runge-Kutta did, are given up for a while. */
 static void rigid_body_dual_learn_from(rigid_body_dual_solver *s, int passes)
 {
-    if (s->foreseeing && (passes == 0 || (passes > 1 && passes >= s->passes))) {
-        s->foreseeing = 0;
-        s->doubt = 2 * s->doubt + 4000;
-        s->retry = s->steps + s->doubt;
-    } else if (passes == 0) {
+    if (passes > 0) {
+        s->setback /= 2;
+    } else {
         s->setback = 2 * s->setback + rigid_body_dual_LANES > 1000 ? 1000 : 2 * s->setback + rigid_body_dual_LANES;
         s->pause = s->setback;
-    } else {
-        s->setback /= 2;
-        if (!s->foreseeing) s->passes = passes;
+    }
+    if (!s->foreseeing) {
+        s->passes = passes > 0 ? passes : INT_MAX;
+    } else if (passes > s->passes || s->setback > 5 * rigid_body_dual_LANES) {
+        s->foreseeing = s->setback = s->pause = 0;
+        s->doubt = 2 * s->doubt + 4000;
+        s->retry = s->steps + s->doubt;
     }
 }
 
@@ -1286,14 +1361,15 @@ static void rigid_body_dual_group_fit(rigid_body_dual_group *group)
     group->patience = group->patience < 10000 ? 2 * group->patience + 1000 : 20000;
 }
 
-/* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group. */
-static int rigid_body_dual_group_open(rigid_body_dual_group *group, const rigid_body_dual_lanes size, const rigid_body_dual_lanes previous)
+/* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group.
+   bound is what remains in each lane. */
+static int rigid_body_dual_group_open(rigid_body_dual_group *group, const rigid_body_dual_lanes size, const rigid_body_dual_lanes previous,
+    double bend, rigid_body_dual_lanes bound)
 {
     int open = 0;
     for (int lane = 0; lane < rigid_body_dual_LANES; ++lane) {
-        const double growth = size[lane] / (previous[lane] * previous[lane]);
-        const double remaining = size[lane] * size[lane] * (growth > 1.0 ? growth : 1.0);
-        const int solved = remaining <= 1e-20 || (previous[lane] < 1e-8 && size[lane] < 1e-10);
+        bound[lane] = rigid_body_dual_remaining(size[lane], bend, bound[lane]);
+        const int solved = bound[lane] <= 1e-20 || (previous[lane] < 1e-8 && size[lane] < 1e-10);
         if (!isfinite(size[lane])) group->active[lane] = 0;
         open += group->active[lane] && !solved;
     }
@@ -1304,14 +1380,16 @@ static int rigid_body_dual_group_open(rigid_body_dual_group *group, const rigid_
    allowed, lanes that are not solved leave the group. */
 static int rigid_body_dual_group_solve(rigid_body_dual_group *group, int stage, rigid_body_dual_lines *line)
 {
-    rigid_body_dual_lanes size, previous;
+    rigid_body_dual_lanes size, previous, bound;
+    double largest = HUGE_VAL, bend = 0.0;
     int iterations = 0, open = 1;
-    for (int lane = 0; lane < rigid_body_dual_LANES; ++lane) size[lane] = HUGE_VAL;
+    for (int lane = 0; lane < rigid_body_dual_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
     if (group->fitting[stage]) rigid_body_dual_group_foresee(group, stage, line->y);
     else rigid_body_dual_group_extrapolate(group, stage, line->y);
     for (; open > 0 && iterations < 20; ++iterations) {
         memcpy(previous, size, sizeof size);
-        rigid_body_dual_tabulate(group->coef[stage], line);
+        rigid_body_dual_update(group->coef[stage], line, largest > 1e-05);
+        bend = largest > 1e-05 ? 0.0 : bend + largest;
         for (int i = 0; i < 3; ++i) {
             rigid_body_dual_EACH_LANE
             for (int lane = 0; lane < rigid_body_dual_LANES; ++lane)
@@ -1319,10 +1397,11 @@ static int rigid_body_dual_group_solve(rigid_body_dual_group *group, int stage, 
                     ((line->y[i][lane] - group->x[i][lane]) + line->displacement[i][lane]) - group->carry[i][lane];
         }
         rigid_body_dual_correct(line, size);
-        open = rigid_body_dual_group_open(group, size, previous);
+        open = rigid_body_dual_group_open(group, size, previous, bend, bound);
+        largest = rigid_body_dual_largest(size);
     }
     for (int lane = 0; lane < rigid_body_dual_LANES && open > 0; ++lane)
-        group->active[lane] = group->active[lane] && size[lane] * size[lane] <= 1e-20;
+        group->active[lane] = group->active[lane] && bound[lane] <= 1e-20;
     return iterations;
 }
 

@@ -13,11 +13,12 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: ea00b577a264d954314617a39be127e170a8062fb4d9b9efc08f75be2950781d
+ * body-sha256: 14d2c72645b32dff08a1a5bde332f04a7f28a2b9cec447bbf90c91713e367adf
  */
 #include "rigid_body_paper.h"
 
 #include <float.h>
+#include <limits.h>
 #include <math.h>
 #include <stdint.h>
 #include <string.h>
@@ -492,6 +493,7 @@ static rigid_body_paper_status rigid_body_paper_set_step(rigid_body_paper_solver
     s->setback = s->foreseeing = 0;
     s->doubt = s->retry = 0;
     s->effort = 0.0;
+    s->passes = INT_MAX;
     s->h = h;
     s->ready = 1;
     return rigid_body_paper_OK;
@@ -663,6 +665,33 @@ static void rigid_body_paper_linearise_lanes(rigid_body_paper_lanes coef[restric
     }
 }
 
+/* rigid_body_paper_evaluate in all lanes. */
+static void rigid_body_paper_evaluate_lanes(rigid_body_paper_lanes coef[restrict 3],
+                                            rigid_body_paper_lanes y[restrict 3],
+                                            rigid_body_paper_lanes displacement[restrict 3],
+                                            rigid_body_paper_lanes increment[restrict 3])
+{
+    rigid_body_paper_EACH_LANE
+    for (int lane = 0; lane < rigid_body_paper_LANES; ++lane) {
+        const double x1 = y[0][lane];
+        const double x2 = y[1][lane];
+        const double x3 = y[2][lane];
+        const double p_x3 = coef[2][lane] * x3;
+        const double p_x1 = coef[0][lane] * x1;
+        const double t1 = x3 * p_x1 - x1 * p_x3;
+        const double p_x2 = coef[1][lane] * x2;
+        const double t2 = x1 * p_x2 - x2 * p_x1;
+        const double t3 = rigid_body_paper_phi0_lane(p_x3 * p_x3 + (p_x2 * p_x2 + p_x1 * p_x1));
+        const double t4 = x2 * p_x3 - x3 * p_x2;
+        displacement[0][lane] = (p_x3 * t1 - p_x2 * t2) * t3 - 0.5 * t4;
+        displacement[1][lane] = (p_x1 * t2 - p_x3 * t4) * t3 - 0.5 * t1;
+        displacement[2][lane] = (p_x2 * t4 - p_x1 * t1) * t3 - 0.5 * t2;
+        increment[0][lane] = t4;
+        increment[1][lane] = t1;
+        increment[2][lane] = t2;
+    }
+}
+
 /* rigid_body_paper_invert in all lanes. */
 static void rigid_body_paper_invert_lanes(rigid_body_paper_lanes matrix[restrict 9],
                                           rigid_body_paper_lanes slope[restrict 9],
@@ -769,6 +798,23 @@ static double rigid_body_paper_largest(const rigid_body_paper_lanes size)
     return isfinite(total) ? largest : HUGE_VAL;
 }
 
+/* What is left after a correction of this size: quadratic in it, where the matrices are of the points corrected; where
+   they are of points further off, by bend, also of the order of size times bend. bound is what the last pass left. */
+static double rigid_body_paper_remaining(double size, double bend, double bound)
+{
+    const double growth = size / bound, left = size * (size + bend);
+    return growth > 1.0 ? growth * left : left;
+}
+
+/* The table of a stage, with its matrices or with those of the last pass. */
+static void rigid_body_paper_update(rigid_body_paper_lanes coef[restrict], rigid_body_paper_lines *line, int matrices)
+{
+    if (matrices)
+        rigid_body_paper_tabulate(coef, line);
+    else
+        rigid_body_paper_evaluate_lanes(coef, line->y, line->displacement, line->increment);
+}
+
 /* The steps of a block one after the other, each along the lines of its lane. As X, the state with its carry, gains
    increment - gain residual, the next residual follows from this one; X itself is added up apart. */
 static void rigid_body_paper_chain(rigid_body_paper_lines line[1], double x[3], double carry[3])
@@ -831,8 +877,9 @@ static void rigid_body_paper_foresee(const rigid_body_paper_memory *memory, rigi
     }
 }
 
-/* Guesses where no recurrence is known: midpoints of steps by the classical Runge-Kutta method. */
-static void rigid_body_paper_march(const rigid_body_paper_solver *s, rigid_body_paper_lines line[1])
+/* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
+   method, to leading order. */
+static void rigid_body_paper_march(const rigid_body_paper_solver *s, rigid_body_paper_table *table, rigid_body_paper_lines line[1])
 {
     static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
     double x[3], point[3], slope[3], mean[3];
@@ -853,6 +900,15 @@ static void rigid_body_paper_march(const rigid_body_paper_solver *s, rigid_body_
             x[i] += h * mean[i];
         }
     }
+    for (int stage = 0; stage < 1; ++stage) {
+        rigid_body_paper_lines *at = &line[stage];
+        rigid_body_paper_evaluate_lanes(table->coef[stage], at->y, at->displacement, at->increment);
+        for (int i = 0; i < 3; ++i) {
+            rigid_body_paper_EACH_LANE
+            for (int lane = 0; lane < rigid_body_paper_LANES; ++lane)
+                at->y[i][lane] -= at->displacement[i][lane] + 0.5 * at->increment[i][lane];
+        }
+    }
 }
 
 /* rigid_body_paper_LANES steps at once: guess the points of all, and correct them together until the error that remains is as
@@ -861,14 +917,15 @@ static int rigid_body_paper_block(rigid_body_paper_solver *s, rigid_body_paper_t
 {
     rigid_body_paper_lines line[1];
     rigid_body_paper_lanes sizes;
-    double x[3], carry[3], value[3], previous = HUGE_VAL;
+    double x[3], carry[3], value[3], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
-    if (!s->foreseeing) rigid_body_paper_march(s, line);
+    if (!s->foreseeing) rigid_body_paper_march(s, table, line);
     for (int stage = 0; stage < 1 && s->foreseeing; ++stage)
         rigid_body_paper_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
     while (!solved) {
         double size = 0.0;
-        for (int stage = 0; stage < 1; ++stage) rigid_body_paper_tabulate(table->coef[stage], &line[stage]);
+        const int matrices = previous > 1e-05;
+        for (int stage = 0; stage < 1; ++stage) rigid_body_paper_update(table->coef[stage], &line[stage], matrices);
         memcpy(x, s->x, sizeof x);
         memcpy(carry, s->carry, sizeof carry);
         rigid_body_paper_chain(line, x, carry);
@@ -877,9 +934,10 @@ static int rigid_body_paper_block(rigid_body_paper_solver *s, rigid_body_paper_t
             size = fmax(size, rigid_body_paper_largest(sizes));
         }
         s->evaluations += 1 * rigid_body_paper_LANES;
-        const double growth = size / (previous * previous);
+        bend = matrices ? 0.0 : bend + previous;
+        bound = rigid_body_paper_remaining(size, bend, bound);
         /* The second test: after the square of so small a correction there is rounding only. */
-        solved = size * size * (growth > 1.0 ? growth : 1.0) <= 1e-20 || (previous < 1e-8 && size < 1e-10);
+        solved = bound <= 1e-20 || (previous < 1e-8 && size < 1e-10);
         if ((++passes >= most || !(size < previous)) && !solved) return 0;
         previous = size;
     }
@@ -909,26 +967,28 @@ static void rigid_body_paper_choose_guess(rigid_body_paper_solver *s, size_t ste
             s->foreseeing = 0;
             return;
         }
-    if (s->foreseeing || (steps < 4000 && s->steps < 4000) || s->steps < s->retry) return;
+    if (s->foreseeing || (steps < 4000 && s->steps < 1000) || s->steps < s->retry) return;
     for (int stage = 0; stage < 1; ++stage) rigid_body_paper_fit(&s->memory[stage]);
     s->foreseeing = 1;
     s->pause = rigid_body_paper_LANES;
 }
 
-/* Learn from a block: recurrences that guess no better than steps by Runge-Kutta are given up for a while, and so are
-   blocks that fail with those. */
+/* Learn from a block: after one that failed single steps are made, the more the more often that happens. Recurrences
+   that fail repeatedly, or need more passes than steps by Runge-Kutta did, are given up for a while. */
 static void rigid_body_paper_learn_from(rigid_body_paper_solver *s, int passes)
 {
-    if (s->foreseeing && (passes == 0 || (passes > 1 && passes >= s->passes))) {
-        s->foreseeing = 0;
-        s->doubt = 2 * s->doubt + 4000;
-        s->retry = s->steps + s->doubt;
-    } else if (passes == 0) {
+    if (passes > 0) {
+        s->setback /= 2;
+    } else {
         s->setback = 2 * s->setback + rigid_body_paper_LANES > 1000 ? 1000 : 2 * s->setback + rigid_body_paper_LANES;
         s->pause = s->setback;
-    } else {
-        s->setback /= 2;
-        if (!s->foreseeing) s->passes = passes;
+    }
+    if (!s->foreseeing) {
+        s->passes = passes > 0 ? passes : INT_MAX;
+    } else if (passes > s->passes || s->setback > 5 * rigid_body_paper_LANES) {
+        s->foreseeing = s->setback = s->pause = 0;
+        s->doubt = 2 * s->doubt + 4000;
+        s->retry = s->steps + s->doubt;
     }
 }
 
@@ -1077,14 +1137,15 @@ static void rigid_body_paper_group_fit(rigid_body_paper_group *group)
     group->patience = group->patience < 10000 ? 2 * group->patience + 1000 : 20000;
 }
 
-/* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group. */
-static int rigid_body_paper_group_open(rigid_body_paper_group *group, const rigid_body_paper_lanes size, const rigid_body_paper_lanes previous)
+/* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group.
+   bound is what remains in each lane. */
+static int rigid_body_paper_group_open(rigid_body_paper_group *group, const rigid_body_paper_lanes size, const rigid_body_paper_lanes previous,
+    double bend, rigid_body_paper_lanes bound)
 {
     int open = 0;
     for (int lane = 0; lane < rigid_body_paper_LANES; ++lane) {
-        const double growth = size[lane] / (previous[lane] * previous[lane]);
-        const double remaining = size[lane] * size[lane] * (growth > 1.0 ? growth : 1.0);
-        const int solved = remaining <= 1e-20 || (previous[lane] < 1e-8 && size[lane] < 1e-10);
+        bound[lane] = rigid_body_paper_remaining(size[lane], bend, bound[lane]);
+        const int solved = bound[lane] <= 1e-20 || (previous[lane] < 1e-8 && size[lane] < 1e-10);
         if (!isfinite(size[lane])) group->active[lane] = 0;
         open += group->active[lane] && !solved;
     }
@@ -1095,14 +1156,16 @@ static int rigid_body_paper_group_open(rigid_body_paper_group *group, const rigi
    allowed, lanes that are not solved leave the group. */
 static int rigid_body_paper_group_solve(rigid_body_paper_group *group, int stage, rigid_body_paper_lines *line)
 {
-    rigid_body_paper_lanes size, previous;
+    rigid_body_paper_lanes size, previous, bound;
+    double largest = HUGE_VAL, bend = 0.0;
     int iterations = 0, open = 1;
-    for (int lane = 0; lane < rigid_body_paper_LANES; ++lane) size[lane] = HUGE_VAL;
+    for (int lane = 0; lane < rigid_body_paper_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
     if (group->fitting[stage]) rigid_body_paper_group_foresee(group, stage, line->y);
     else rigid_body_paper_group_extrapolate(group, stage, line->y);
     for (; open > 0 && iterations < 20; ++iterations) {
         memcpy(previous, size, sizeof size);
-        rigid_body_paper_tabulate(group->coef[stage], line);
+        rigid_body_paper_update(group->coef[stage], line, largest > 1e-05);
+        bend = largest > 1e-05 ? 0.0 : bend + largest;
         for (int i = 0; i < 3; ++i) {
             rigid_body_paper_EACH_LANE
             for (int lane = 0; lane < rigid_body_paper_LANES; ++lane)
@@ -1110,10 +1173,11 @@ static int rigid_body_paper_group_solve(rigid_body_paper_group *group, int stage
                     ((line->y[i][lane] - group->x[i][lane]) + line->displacement[i][lane]) - group->carry[i][lane];
         }
         rigid_body_paper_correct(line, size);
-        open = rigid_body_paper_group_open(group, size, previous);
+        open = rigid_body_paper_group_open(group, size, previous, bend, bound);
+        largest = rigid_body_paper_largest(size);
     }
     for (int lane = 0; lane < rigid_body_paper_LANES && open > 0; ++lane)
-        group->active[lane] = group->active[lane] && size[lane] * size[lane] <= 1e-20;
+        group->active[lane] = group->active[lane] && bound[lane] <= 1e-20;
     return iterations;
 }
 

@@ -13,11 +13,12 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 481c6435c9f1f0a11b586998af06f8ecf24619f5fafd9b5cb848a3f7593f73bc
+ * body-sha256: adaddd4505603614920354e6bd2c9d43fc08e0a146848a2631ac1e2479e9d5db
  */
 #include "sir_epidemic.h"
 
 #include <float.h>
+#include <limits.h>
 #include <math.h>
 #include <stdint.h>
 #include <string.h>

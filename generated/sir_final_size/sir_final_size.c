@@ -12,11 +12,12 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 2291e10af5543a733730dd421438c3ce5daae8aaca267f4d947259a85da19f9a
+ * body-sha256: 0d69961f39f249a426491a9424900b9c385c573d94c9156363b12ea1ae92fe0e
  */
 #include "sir_final_size.h"
 
 #include <float.h>
+#include <limits.h>
 #include <math.h>
 #include <stdint.h>
 #include <string.h>

@@ -14,11 +14,12 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 53fbebdefc1b2a0bb5c5fe032d3161e2e516bc23af579d1de98e0c1266a09f24
+ * body-sha256: 8d97f48682770d1f7513eaf0e69cb203ff889fd90b0925f82a31260251216bfb
  */
 #include "sklyanin_gyrostat.h"
 
 #include <float.h>
+#include <limits.h>
 #include <math.h>
 #include <stdint.h>
 #include <string.h>

@@ -14,11 +14,12 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: d2d44593653d80d517fb6f1d9e8ea9959572fc3124419968da3e82b9318d6e92
+ * body-sha256: 0a3599d8a2c46030ff180616720e283468fc6e7336bad9baf388fbf54f57564a
  */
 #include "so4_manakov.h"
 
 #include <float.h>
+#include <limits.h>
 #include <math.h>
 #include <stdint.h>
 #include <string.h>
@@ -1105,6 +1106,7 @@ static so4_manakov_status so4_manakov_set_step(so4_manakov_solver *s, double h)
     s->setback = s->foreseeing = 0;
     s->doubt = s->retry = 0;
     s->effort = 0.0;
+    s->passes = INT_MAX;
     s->h = h;
     s->ready = 1;
     return so4_manakov_OK;
@@ -1728,6 +1730,113 @@ static void so4_manakov_linearise_lanes(so4_manakov_lanes coef[restrict 32], so4
     so4_manakov_linearise_lanes_part3(coef, y, displacement, increment, jacobian, increment_jacobian, work);
 }
 
+/* so4_manakov_evaluate in all lanes. */
+static void so4_manakov_evaluate_lanes(so4_manakov_lanes coef[restrict 32], so4_manakov_lanes y[restrict 6],
+                                       so4_manakov_lanes displacement[restrict 6],
+                                       so4_manakov_lanes increment[restrict 6])
+{
+    so4_manakov_EACH_LANE
+    for (int lane = 0; lane < so4_manakov_LANES; ++lane) {
+        const double x12 = y[0][lane];
+        const double x13 = y[1][lane];
+        const double x14 = y[2][lane];
+        const double x23 = y[3][lane];
+        const double x24 = y[4][lane];
+        const double x34 = y[5][lane];
+        const double t1 = x14 * x23;
+        const double t2 = x13 * x24;
+        const double t3 = coef[0][lane] * t1 + coef[1][lane] * t2;
+        const double t4 = x24 * x24;
+        const double t5 = x23 * x23;
+        const double t6 = x14 * x14;
+        const double t7 = x13 * x13;
+        const double p_x12 = x34 * t3 + x12 * (coef[3][lane] * t4 + (coef[4][lane] * t5 + coef[5][lane] * t6 + (coef[2][lane] + coef[6][lane] * t7)));
+        const double p_x34 = x12 * t3 + x34 * (coef[18][lane] * t4 + (coef[19][lane] + coef[9][lane] * t7 + (coef[13][lane] * t6 + coef[15][lane] * t5)));
+        const double t8 = 2.0 * p_x34;
+        const double t9 = x12 * x34;
+        const double t10 = coef[7][lane] * t1 + coef[1][lane] * t9;
+        const double t11 = x34 * x34;
+        const double t12 = x12 * x12;
+        const double p_x13 = x24 * t10 + x13 * (coef[9][lane] * t11 + (coef[8][lane] + coef[6][lane] * t12 + (coef[10][lane] * t5 + coef[11][lane] * t6)));
+        const double p_x24 = x13 * t10 + x24 * (coef[18][lane] * t11 + (coef[16][lane] * t5 + coef[14][lane] * t6 + (coef[17][lane] + coef[3][lane] * t12)));
+        const double t13 = 2.0 * p_x24;
+        const double t14 = coef[7][lane] * t2 + coef[0][lane] * t9;
+        const double p_x23 = x14 * t14 + x23 * (coef[15][lane] * t11 + (coef[16][lane] * t4 + coef[10][lane] * t7 + (coef[12][lane] + coef[4][lane] * t12)));
+        const double t15 = p_x34 * p_x34 + (p_x24 * p_x24 + p_x23 * p_x23);
+        const double p_x14 = x23 * t14 + x14 * (coef[13][lane] * t11 + (coef[14][lane] * t4 + coef[11][lane] * t7 + (coef[12][lane] + coef[5][lane] * t12)));
+        const double t16 = 2.0 * p_x23;
+        const double t17 = so4_manakov_phi0_lane(p_x12 * (p_x12 + t8) + (p_x13 * (p_x13 - t13) + (t15 + p_x14 * (p_x14 + t16))));
+        const double t18 = 0.5 * p_x24;
+        const double t19 = 0.5 * p_x13;
+        const double t20 = t18 - t19;
+        const double t21 = t19 - t18;
+        const double t22 = 0.5 * p_x12;
+        const double t23 = 0.5 * p_x34;
+        const double t24 = t22 + t23;
+        const double t25 = x34 * t21 + x24 * t24 + (x12 * t21 - x13 * t24);
+        const double t26 = t20 * t25;
+        const double t27 = 0.5 * p_x23;
+        const double t28 = 0.5 * p_x14;
+        const double t29 = t27 + t28;
+        const double t30 = x23 * t24;
+        const double t31 = x34 * t29;
+        const double t32 = x14 * t24;
+        const double t33 = x12 * t29;
+        const double t34 = t30 - t31 + (t32 - t33);
+        const double t35 = t33 - t32 + (t31 - t30);
+        const double t36 = t17 * (t26 + t29 * t34 + (t26 - t29 * t35));
+        const double t37 = so4_manakov_phi0_lane(p_x12 * (p_x12 - t8) + (p_x13 * (p_x13 + t13) + (t15 + p_x14 * (p_x14 - t16))));
+        const double t38 = t19 + t18;
+        const double t39 = x34 * t38;
+        const double t40 = t22 - t23;
+        const double t41 = x12 * t38;
+        const double t42 = t39 + x24 * t40 + (x13 * t40 - t41);
+        const double t43 = t38 * t42;
+        const double t44 = t27 - t28;
+        const double t45 = t23 - t22;
+        const double t46 = t28 - t27;
+        const double t47 = x14 * t45 + x12 * t46 + (x34 * t44 + x23 * t40);
+        const double t48 = t44 * t47;
+        const double t49 = t41 + x13 * t45 + (x24 * t45 - t39);
+        const double t50 = t38 * t49;
+        const double t51 = x13 * p_x23 + x14 * p_x24 - (x23 * p_x13 + x24 * p_x14);
+        const double t52 = x23 * t38;
+        const double t53 = x14 * t38;
+        const double t54 = t52 + x24 * t46 + (x13 * t46 - t53);
+        const double t55 = x24 * t44 - t52 + (x13 * t44 + t53);
+        const double t56 = t37 * (t44 * t54 + t40 * t49 + (t46 * t55 + t45 * t42));
+        const double t57 = t24 * t25;
+        const double t58 = x14 * t20 + x13 * t29 + (x23 * t20 - x24 * t29);
+        const double t59 = t29 * t58;
+        const double t60 = t57 - t59;
+        const double t61 = x23 * p_x12 - x34 * p_x14 + (x14 * p_x34 - x12 * p_x23);
+        const double t62 = t40 * t47;
+        const double t63 = t38 * t55;
+        const double t64 = t38 * t54;
+        const double t65 = t21 * t58;
+        const double t66 = t17 * (t65 + t24 * t35 + (t65 - t24 * t34));
+        const double t67 = x34 * p_x13 + x24 * p_x12 - (x13 * p_x34 + x12 * p_x24);
+        const double t68 = t45 * t47;
+        const double t69 = x12 * p_x13 - x13 * p_x12 + (x24 * p_x34 - x34 * p_x24);
+        const double t70 = t59 - t57;
+        const double t71 = x12 * p_x14 - x14 * p_x12 + (x34 * p_x23 - x23 * p_x34);
+        const double t72 = t46 * t47;
+        const double t73 = x13 * p_x14 - x14 * p_x13 + (x23 * p_x24 - x24 * p_x23);
+        displacement[0][lane] = t36 + t37 * (t43 + t48 + (t48 - t50)) - 0.5 * t51;
+        displacement[1][lane] = t56 + t17 * (t60 + t60) - 0.5 * t61;
+        displacement[2][lane] = t37 * (t62 - t63 + (t62 + t64)) + t66 - 0.5 * t67;
+        displacement[3][lane] = t37 * (t68 - t64 + (t63 + t68)) + t66 - 0.5 * t69;
+        displacement[4][lane] = t17 * (t70 + t70) + t56 - 0.5 * t71;
+        displacement[5][lane] = t36 + t37 * (t72 - t43 + (t50 + t72)) - 0.5 * t73;
+        increment[0][lane] = t51;
+        increment[1][lane] = t61;
+        increment[2][lane] = t67;
+        increment[3][lane] = t69;
+        increment[4][lane] = t71;
+        increment[5][lane] = t73;
+    }
+}
+
 /* Invert the matrices of all lanes in place by elimination without pivoting: they are I + O(h). Infinite where a pivot is
    far from 1. */
 static void so4_manakov_invert(so4_manakov_lanes matrix[restrict 36])
@@ -1817,6 +1926,23 @@ static double so4_manakov_largest(const so4_manakov_lanes size)
     return isfinite(total) ? largest : HUGE_VAL;
 }
 
+/* What is left after a correction of this size: quadratic in it, where the matrices are of the points corrected; where
+   they are of points further off, by bend, also of the order of size times bend. bound is what the last pass left. */
+static double so4_manakov_remaining(double size, double bend, double bound)
+{
+    const double growth = size / bound, left = size * (size + bend);
+    return growth > 1.0 ? growth * left : left;
+}
+
+/* The table of a stage, with its matrices or with those of the last pass. */
+static void so4_manakov_update(so4_manakov_lanes coef[restrict], so4_manakov_lines *line, int matrices)
+{
+    if (matrices)
+        so4_manakov_tabulate(coef, line);
+    else
+        so4_manakov_evaluate_lanes(coef, line->y, line->displacement, line->increment);
+}
+
 /* The steps of a block one after the other, each along the lines of its lane. As X, the state with its carry, gains
    increment - gain residual, the next residual follows from this one; X itself is added up apart. */
 static void so4_manakov_chain(so4_manakov_lines line[1], double x[6], double carry[6])
@@ -1879,8 +2005,9 @@ static void so4_manakov_foresee(const so4_manakov_memory *memory, so4_manakov_la
     }
 }
 
-/* Guesses where no recurrence is known: midpoints of steps by the classical Runge-Kutta method. */
-static void so4_manakov_march(const so4_manakov_solver *s, so4_manakov_lines line[1])
+/* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
+   method, to leading order. */
+static void so4_manakov_march(const so4_manakov_solver *s, so4_manakov_table *table, so4_manakov_lines line[1])
 {
     static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
     double x[6], point[6], slope[6], mean[6];
@@ -1901,6 +2028,15 @@ static void so4_manakov_march(const so4_manakov_solver *s, so4_manakov_lines lin
             x[i] += h * mean[i];
         }
     }
+    for (int stage = 0; stage < 1; ++stage) {
+        so4_manakov_lines *at = &line[stage];
+        so4_manakov_evaluate_lanes(table->coef[stage], at->y, at->displacement, at->increment);
+        for (int i = 0; i < 6; ++i) {
+            so4_manakov_EACH_LANE
+            for (int lane = 0; lane < so4_manakov_LANES; ++lane)
+                at->y[i][lane] -= at->displacement[i][lane] + 0.5 * at->increment[i][lane];
+        }
+    }
 }
 
 /* so4_manakov_LANES steps at once: guess the points of all, and correct them together until the error that remains is as
@@ -1909,14 +2045,15 @@ static int so4_manakov_block(so4_manakov_solver *s, so4_manakov_table *table, in
 {
     so4_manakov_lines line[1];
     so4_manakov_lanes sizes;
-    double x[6], carry[6], value[6], previous = HUGE_VAL;
+    double x[6], carry[6], value[6], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
-    if (!s->foreseeing) so4_manakov_march(s, line);
+    if (!s->foreseeing) so4_manakov_march(s, table, line);
     for (int stage = 0; stage < 1 && s->foreseeing; ++stage)
         so4_manakov_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
     while (!solved) {
         double size = 0.0;
-        for (int stage = 0; stage < 1; ++stage) so4_manakov_tabulate(table->coef[stage], &line[stage]);
+        const int matrices = previous > 1e-05;
+        for (int stage = 0; stage < 1; ++stage) so4_manakov_update(table->coef[stage], &line[stage], matrices);
         memcpy(x, s->x, sizeof x);
         memcpy(carry, s->carry, sizeof carry);
         so4_manakov_chain(line, x, carry);
@@ -1925,9 +2062,10 @@ static int so4_manakov_block(so4_manakov_solver *s, so4_manakov_table *table, in
             size = fmax(size, so4_manakov_largest(sizes));
         }
         s->evaluations += 1 * so4_manakov_LANES;
-        const double growth = size / (previous * previous);
+        bend = matrices ? 0.0 : bend + previous;
+        bound = so4_manakov_remaining(size, bend, bound);
         /* The second test: after the square of so small a correction there is rounding only. */
-        solved = size * size * (growth > 1.0 ? growth : 1.0) <= 1e-20 || (previous < 1e-8 && size < 1e-10);
+        solved = bound <= 1e-20 || (previous < 1e-8 && size < 1e-10);
         if ((++passes >= most || !(size < previous)) && !solved) return 0;
         previous = size;
     }
@@ -1957,26 +2095,28 @@ static void so4_manakov_choose_guess(so4_manakov_solver *s, size_t steps)
             s->foreseeing = 0;
             return;
         }
-    if (s->foreseeing || (steps < 4000 && s->steps < 4000) || s->steps < s->retry) return;
+    if (s->foreseeing || (steps < 4000 && s->steps < 1000) || s->steps < s->retry) return;
     for (int stage = 0; stage < 1; ++stage) so4_manakov_fit(&s->memory[stage]);
     s->foreseeing = 1;
     s->pause = so4_manakov_LANES;
 }
 
-/* Learn from a block: recurrences that guess no better than steps by Runge-Kutta are given up for a while, and so are
-   blocks that fail with those. */
+/* Learn from a block: after one that failed single steps are made, the more the more often that happens. Recurrences
+   that fail repeatedly, or need more passes than steps by Runge-Kutta did, are given up for a while. */
 static void so4_manakov_learn_from(so4_manakov_solver *s, int passes)
 {
-    if (s->foreseeing && (passes == 0 || (passes > 1 && passes >= s->passes))) {
-        s->foreseeing = 0;
-        s->doubt = 2 * s->doubt + 4000;
-        s->retry = s->steps + s->doubt;
-    } else if (passes == 0) {
+    if (passes > 0) {
+        s->setback /= 2;
+    } else {
         s->setback = 2 * s->setback + so4_manakov_LANES > 1000 ? 1000 : 2 * s->setback + so4_manakov_LANES;
         s->pause = s->setback;
-    } else {
-        s->setback /= 2;
-        if (!s->foreseeing) s->passes = passes;
+    }
+    if (!s->foreseeing) {
+        s->passes = passes > 0 ? passes : INT_MAX;
+    } else if (passes > s->passes || s->setback > 5 * so4_manakov_LANES) {
+        s->foreseeing = s->setback = s->pause = 0;
+        s->doubt = 2 * s->doubt + 4000;
+        s->retry = s->steps + s->doubt;
     }
 }
 
@@ -2126,14 +2266,15 @@ static void so4_manakov_group_fit(so4_manakov_group *group)
     group->patience = group->patience < 10000 ? 2 * group->patience + 1000 : 20000;
 }
 
-/* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group. */
-static int so4_manakov_group_open(so4_manakov_group *group, const so4_manakov_lanes size, const so4_manakov_lanes previous)
+/* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group.
+   bound is what remains in each lane. */
+static int so4_manakov_group_open(so4_manakov_group *group, const so4_manakov_lanes size, const so4_manakov_lanes previous,
+    double bend, so4_manakov_lanes bound)
 {
     int open = 0;
     for (int lane = 0; lane < so4_manakov_LANES; ++lane) {
-        const double growth = size[lane] / (previous[lane] * previous[lane]);
-        const double remaining = size[lane] * size[lane] * (growth > 1.0 ? growth : 1.0);
-        const int solved = remaining <= 1e-20 || (previous[lane] < 1e-8 && size[lane] < 1e-10);
+        bound[lane] = so4_manakov_remaining(size[lane], bend, bound[lane]);
+        const int solved = bound[lane] <= 1e-20 || (previous[lane] < 1e-8 && size[lane] < 1e-10);
         if (!isfinite(size[lane])) group->active[lane] = 0;
         open += group->active[lane] && !solved;
     }
@@ -2144,14 +2285,16 @@ static int so4_manakov_group_open(so4_manakov_group *group, const so4_manakov_la
    allowed, lanes that are not solved leave the group. */
 static int so4_manakov_group_solve(so4_manakov_group *group, int stage, so4_manakov_lines *line)
 {
-    so4_manakov_lanes size, previous;
+    so4_manakov_lanes size, previous, bound;
+    double largest = HUGE_VAL, bend = 0.0;
     int iterations = 0, open = 1;
-    for (int lane = 0; lane < so4_manakov_LANES; ++lane) size[lane] = HUGE_VAL;
+    for (int lane = 0; lane < so4_manakov_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
     if (group->fitting[stage]) so4_manakov_group_foresee(group, stage, line->y);
     else so4_manakov_group_extrapolate(group, stage, line->y);
     for (; open > 0 && iterations < 20; ++iterations) {
         memcpy(previous, size, sizeof size);
-        so4_manakov_tabulate(group->coef[stage], line);
+        so4_manakov_update(group->coef[stage], line, largest > 1e-05);
+        bend = largest > 1e-05 ? 0.0 : bend + largest;
         for (int i = 0; i < 6; ++i) {
             so4_manakov_EACH_LANE
             for (int lane = 0; lane < so4_manakov_LANES; ++lane)
@@ -2159,10 +2302,11 @@ static int so4_manakov_group_solve(so4_manakov_group *group, int stage, so4_mana
                     ((line->y[i][lane] - group->x[i][lane]) + line->displacement[i][lane]) - group->carry[i][lane];
         }
         so4_manakov_correct(line, size);
-        open = so4_manakov_group_open(group, size, previous);
+        open = so4_manakov_group_open(group, size, previous, bend, bound);
+        largest = so4_manakov_largest(size);
     }
     for (int lane = 0; lane < so4_manakov_LANES && open > 0; ++lane)
-        group->active[lane] = group->active[lane] && size[lane] * size[lane] <= 1e-20;
+        group->active[lane] = group->active[lane] && bound[lane] <= 1e-20;
     return iterations;
 }
 

@@ -14,11 +14,12 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 54da7a88564fcf559894e7f29d6ee10b1f256c9ae85cf0810a89748acea1f902
+ * body-sha256: 4a69a34ed3e29dab5fcbf080e1d76a6a050541f493db2f7007c2d1566e293ffe
  */
 #include "spin_chain5.h"
 
 #include <float.h>
+#include <limits.h>
 #include <math.h>
 #include <stdint.h>
 #include <string.h>
@@ -2496,6 +2497,7 @@ static spin_chain5_status spin_chain5_set_step(spin_chain5_solver *s, double h)
     s->setback = s->foreseeing = 0;
     s->doubt = s->retry = 0;
     s->effort = 0.0;
+    s->passes = INT_MAX;
     s->h = h;
     s->ready = 1;
     return spin_chain5_OK;
@@ -4101,6 +4103,360 @@ static void spin_chain5_linearise_lanes(spin_chain5_lanes coef[restrict 33], spi
     spin_chain5_linearise_lanes_part7(coef, y, displacement, increment, jacobian, increment_jacobian, work);
 }
 
+/* spin_chain5_evaluate_lanes_part1 (part 1 of 2) */
+spin_chain5_APART static void spin_chain5_evaluate_lanes_part1(spin_chain5_lanes coef[restrict 33],
+                                                               spin_chain5_lanes y[restrict 15],
+                                                               spin_chain5_lanes displacement[restrict 15],
+                                                               spin_chain5_lanes increment[restrict 15],
+                                                               spin_chain5_lanes work[restrict 86])
+{
+    spin_chain5_EACH_LANE
+    for (int lane = 0; lane < spin_chain5_LANES; ++lane) {
+        const double x1 = y[0][lane];
+        const double y1_ = y[1][lane];
+        const double z1 = y[2][lane];
+        const double x2 = y[3][lane];
+        const double y2 = y[4][lane];
+        const double z2 = y[5][lane];
+        const double x3 = y[6][lane];
+        const double y3 = y[7][lane];
+        const double z3 = y[8][lane];
+        const double x4 = y[9][lane];
+        const double y4 = y[10][lane];
+        const double z4 = y[11][lane];
+        const double x5 = y[12][lane];
+        const double y5 = y[13][lane];
+        const double z5 = y[14][lane];
+        work[19][lane] = coef[3][lane] * x5;
+        work[57][lane] = coef[3][lane] * x4;
+        work[7][lane] = work[19][lane] + (coef[5][lane] * x2 + work[57][lane]);
+        const double t4 = coef[9][lane] * z2 + coef[8][lane] * z5;
+        const double t5 = x1 * t4;
+        const double t6 = coef[13][lane] * x2;
+        const double t7 = coef[12][lane] * x5 + t6;
+        work[27][lane] = x5 * z4;
+        work[26][lane] = x4 * z5;
+        const double t10 = coef[3][lane] * work[27][lane] + coef[4][lane] * work[26][lane];
+        const double t11 = coef[6][lane] * z2;
+        const double t12 = t11 + coef[4][lane] * z4;
+        const double t13 = t10 + x3 * t12;
+        work[21][lane] = coef[3][lane] * y5;
+        work[59][lane] = coef[3][lane] * y4;
+        const double t16 = work[21][lane] + (coef[5][lane] * y2 + work[59][lane]);
+        const double t17 = y1_ * t4;
+        const double t18 = coef[13][lane] * y2;
+        const double t19 = t18 + coef[12][lane] * y5;
+        work[30][lane] = y5 * z4;
+        work[31][lane] = y4 * z5;
+        const double t22 = coef[3][lane] * work[30][lane] + coef[4][lane] * work[31][lane];
+        const double t23 = y3 * t12 + t22;
+        const double t24 = coef[8][lane] * z2 + coef[7][lane] * z5;
+        work[71][lane] = x1 * t24;
+        work[69][lane] = coef[3][lane] * z4;
+        work[23][lane] = coef[4][lane] * z2;
+        const double t28 = work[69][lane] + work[23][lane];
+        work[72][lane] = x3 * t28;
+        work[22][lane] = coef[1][lane] * z5;
+        const double t31 = work[22][lane] + coef[4][lane] * z3;
+        work[73][lane] = x4 * t31;
+        work[70][lane] = coef[11][lane] * z1;
+        const double t34 = coef[2][lane] * z4 + work[70][lane];
+        work[32][lane] = coef[0][lane] * z5;
+        const double t36 = coef[0][lane] * z2;
+        work[79][lane] = y1_ * t24;
+        work[80][lane] = y3 * t28;
+        work[81][lane] = y4 * t31;
+        const double t40 = x5 * (work[71][lane] + (work[72][lane] + (work[73][lane] + x5 * t34))) + (work[32][lane] + (coef[10][lane] * z1 + t36) + y5 * (work[79][lane] + (work[80][lane] + (y5 * t34 + work[81][lane]))));
+        const double p_z1 = x2 * (z3 * work[7][lane] + (t5 + (z1 * t7 + t13))) + (y2 * (z3 * t16 + (t17 + (z1 * t19 + t23))) + t40);
+        const double t41 = coef[8][lane] * y5 + coef[9][lane] * y2;
+        const double t42 = x1 * t41;
+        work[40][lane] = x5 * y4;
+        work[41][lane] = x4 * y5;
+        const double t45 = coef[3][lane] * work[40][lane] + coef[4][lane] * work[41][lane];
+        const double t46 = coef[6][lane] * y2;
+        const double t47 = coef[4][lane] * y4 + t46;
+        const double t48 = t45 + x3 * t47;
+        work[37][lane] = coef[3][lane] * z5;
+        work[12][lane] = work[37][lane] + (coef[5][lane] * z2 + work[69][lane]);
+        const double t51 = coef[13][lane] * z2;
+        const double t52 = coef[12][lane] * z5 + t51;
+        const double t53 = coef[4][lane] * work[30][lane] + coef[3][lane] * work[31][lane];
+        const double t54 = z1 * t41 + (t53 + z3 * t47);
+        const double t55 = coef[7][lane] * y5 + coef[8][lane] * y2;
+        work[76][lane] = x1 * t55;
+        work[29][lane] = coef[4][lane] * y2;
+        const double t58 = work[59][lane] + work[29][lane];
+        work[77][lane] = x3 * t58;
+        work[48][lane] = coef[1][lane] * y5;
+        const double t61 = coef[4][lane] * y3 + work[48][lane];
+        work[78][lane] = x4 * t61;
+        work[60][lane] = coef[11][lane] * y1_;
+        const double t64 = work[60][lane] + coef[2][lane] * y4;
+        work[52][lane] = coef[0][lane] * y5;
+        work[6][lane] = coef[0][lane] * y2;
+        work[66][lane] = z1 * t55;
+        work[67][lane] = z3 * t58;
+        work[68][lane] = z4 * t61;
+        const double t70 = x5 * (work[76][lane] + (work[77][lane] + (work[78][lane] + x5 * t64))) + (work[52][lane] + (work[6][lane] + coef[10][lane] * y1_) + z5 * (work[66][lane] + (work[67][lane] + (work[68][lane] + z5 * t64))));
+        const double p_y1 = x2 * (y3 * work[7][lane] + (t42 + (y1_ * t7 + t48))) + (z2 * (y3 * work[12][lane] + (y1_ * t52 + t54)) + t70);
+        const double t71 = coef[9][lane] * x2 + coef[8][lane] * x5;
+        const double t72 = coef[6][lane] * x2;
+        const double t73 = coef[4][lane] * x4 + t72;
+        work[10][lane] = coef[4][lane] * work[40][lane] + coef[3][lane] * work[41][lane];
+        const double t75 = y1_ * t71 + (y3 * t73 + work[10][lane]);
+        const double t76 = coef[3][lane] * work[26][lane] + coef[4][lane] * work[27][lane];
+        const double t77 = z1 * t71 + (t76 + z3 * t73);
+        const double t78 = coef[8][lane] * x2 + coef[7][lane] * x5;
+        work[83][lane] = y1_ * t78;
+        work[24][lane] = coef[4][lane] * x2;
+        const double t81 = work[24][lane] + work[57][lane];
+        work[84][lane] = y3 * t81;
+        work[39][lane] = coef[1][lane] * x5;
+        const double t84 = coef[4][lane] * x3 + work[39][lane];
+        work[85][lane] = y4 * t84;
+        work[58][lane] = coef[11][lane] * x1;
+        const double t87 = work[58][lane] + coef[2][lane] * x4;
+        work[43][lane] = coef[0][lane] * x5;
+        const double t89 = coef[0][lane] * x2;
+        work[63][lane] = z1 * t78;
+        work[64][lane] = z3 * t81;
+        work[65][lane] = z4 * t84;
+        const double t93 = y5 * (work[83][lane] + (work[84][lane] + (work[85][lane] + y5 * t87))) + (work[43][lane] + (coef[10][lane] * x1 + t89) + z5 * (work[63][lane] + (work[64][lane] + (z5 * t87 + work[65][lane]))));
+        const double p_x1 = y2 * (x3 * t16 + (x1 * t19 + t75)) + (z2 * (x3 * work[12][lane] + (x1 * t52 + t77)) + t93);
+        const double t94 = spin_chain5_phi0_lane(p_z1 * p_z1 + (p_y1 * p_y1 + p_x1 * p_x1));
+        const double t95 = z1 * p_x1 - x1 * p_z1;
+        const double t96 = x1 * p_y1 - y1_ * p_x1;
+        const double t97 = y1_ * p_z1 - z1 * p_y1;
+        const double t98 = work[37][lane] + (work[69][lane] + coef[19][lane] * z2);
+        const double t99 = coef[20][lane] * z5 + t51;
+        const double t100 = coef[4][lane] * x5 + t72;
+        const double t101 = z1 * t100;
+        const double t102 = coef[18][lane] * z2;
+        const double t103 = coef[14][lane] * z4 + t102;
+        const double t104 = coef[16][lane] * x2 + coef[15][lane] * x4;
+        const double t105 = z3 * t104 + t10;
+        work[33][lane] = coef[0][lane] * z3;
+        work[61][lane] = coef[0][lane] * z1;
+        const double t108 = coef[4][lane] * y5 + t46;
+        work[13][lane] = z1 * t108;
+        const double t110 = coef[15][lane] * y4 + coef[16][lane] * y2;
+        work[15][lane] = z3 * t110 + t22;
+        const double t112 = y1_ * (y3 * t98 + (y1_ * t99 + t54)) + (x3 * (t101 + (x3 * t103 + t105)) + (work[33][lane] + (coef[17][lane] * z2 + work[61][lane]) + y3 * (work[13][lane] + (y3 * t103 + work[15][lane]))));
+        const double p_z2 = x1 * (x3 * t98 + (x1 * t99 + t77)) + t112;
+        const double t113 = work[19][lane] + (coef[19][lane] * x2 + work[57][lane]);
+        const double t114 = coef[20][lane] * x5 + t6;
+        work[8][lane] = x1 * t108;
+        work[9][lane] = x3 * t110;
+        const double t117 = coef[18][lane] * x2;
+        const double t118 = t117 + coef[14][lane] * x4;
+        work[44][lane] = coef[0][lane] * x3;
+        work[75][lane] = coef[0][lane] * x1;
+        const double t121 = t11 + coef[4][lane] * z5;
+        const double t122 = x1 * t121;
+        const double t123 = coef[15][lane] * z4 + coef[16][lane] * z2;
+        const double t124 = x3 * t123;
+        const double t125 = y3 * (work[8][lane] + (work[9][lane] + (y3 * t118 + work[10][lane]))) + (work[44][lane] + (work[75][lane] + coef[17][lane] * x2) + z3 * (t122 + (t124 + (t76 + z3 * t118))));
+        const double p_x2 = y1_ * (y3 * t113 + (t42 + (y1_ * t114 + t48))) + (z1 * (z3 * t113 + (t5 + (z1 * t114 + t13))) + t125);
+        const double t126 = z2 * p_x2 - x2 * p_z2;
+        const double t127 = work[21][lane] + (coef[19][lane] * y2 + work[59][lane]);
+        const double t128 = coef[20][lane] * y5 + t18;
+        const double t129 = y1_ * t100;
+        const double t130 = coef[18][lane] * y2;
+        const double t131 = t130 + coef[14][lane] * y4;
+        const double t132 = y3 * t104 + t45;
+        work[53][lane] = coef[0][lane] * y3;
+        work[82][lane] = coef[0][lane] * y1_;
+        const double t135 = y1_ * t121;
+        const double t136 = y3 * t123;
+        const double t137 = z1 * (z3 * t127 + (t17 + (z1 * t128 + t23))) + (x3 * (t129 + (x3 * t131 + t132)) + (work[53][lane] + (work[82][lane] + coef[17][lane] * y2) + z3 * (t135 + (t136 + (z3 * t131 + t53)))));
+        const double p_y2 = x1 * (x3 * t127 + (x1 * t128 + t75)) + t137;
+        const double t138 = x2 * p_y2 - y2 * p_x2;
+        const double t139 = spin_chain5_phi0_lane(p_z2 * p_z2 + (p_x2 * p_x2 + p_y2 * p_y2));
+        const double t140 = y2 * p_z2 - z2 * p_y2;
+        work[11][lane] = t117 + coef[26][lane] * x4;
+        const double t142 = t130 + coef[26][lane] * y4;
+        const double t143 = work[37][lane] + work[23][lane];
+        work[45][lane] = x1 * t143;
+        const double t145 = coef[23][lane] * z4 + coef[15][lane] * z2;
+        work[46][lane] = x3 * t145;
+        work[38][lane] = coef[25][lane] * z3;
+        const double t148 = work[38][lane] + coef[21][lane] * z5;
+        work[42][lane] = coef[22][lane] * z4;
+        const double t150 = work[42][lane] + coef[4][lane] * z1;
+        work[47][lane] = x5 * t150;
+        work[62][lane] = coef[0][lane] * z4;
+        work[49][lane] = y1_ * t143;
+        work[50][lane] = y3 * t145;
+        work[51][lane] = y5 * t150;
+        const double t156 = x4 * (work[45][lane] + (work[46][lane] + (x4 * t148 + work[47][lane]))) + (work[62][lane] + (coef[24][lane] * z3 + t36) + y4 * (work[49][lane] + (work[50][lane] + (work[51][lane] + y4 * t148))));
+        work[17][lane] = x2 * (z1 * work[7][lane] + (t122 + (t124 + (t76 + z3 * work[11][lane])))) + (y2 * (z1 * t16 + (t135 + (t136 + (t53 + z3 * t142)))) + t156);
+        work[14][lane] = t102 + coef[26][lane] * z4;
+        const double t158 = work[24][lane] + work[19][lane];
+        work[54][lane] = y1_ * t158;
+        const double t160 = coef[23][lane] * x4 + coef[15][lane] * x2;
+        work[55][lane] = y3 * t160;
+        work[20][lane] = coef[25][lane] * x3;
+        const double t163 = work[20][lane] + coef[21][lane] * x5;
+        work[25][lane] = coef[22][lane] * x4;
+        const double t165 = work[25][lane] + coef[4][lane] * x1;
+        work[56][lane] = y5 * t165;
+        work[74][lane] = coef[0][lane] * x4;
+        work[34][lane] = z1 * t158;
+        work[35][lane] = z3 * t160;
+        work[36][lane] = z5 * t165;
+        const double t171 = y4 * (work[54][lane] + (work[55][lane] + (y4 * t163 + work[56][lane]))) + (work[74][lane] + (t89 + coef[24][lane] * x3) + z4 * (work[34][lane] + (work[35][lane] + (z4 * t163 + work[36][lane]))));
+        work[16][lane] = y2 * (x1 * t16 + (t129 + (x3 * t142 + t132))) + (z2 * (x1 * work[12][lane] + (t101 + (x3 * work[14][lane] + t105))) + t171);
+        work[18][lane] = z3 * work[16][lane] - x3 * work[17][lane];
+        work[0][lane] = work[21][lane] + work[29][lane];
+        work[3][lane] = x1 * work[0][lane];
+        work[1][lane] = coef[15][lane] * y2 + coef[23][lane] * y4;
+        work[4][lane] = x3 * work[1][lane];
+        work[28][lane] = coef[22][lane] * y4;
+        work[2][lane] = work[28][lane] + coef[4][lane] * y1_;
+        work[5][lane] = x5 * work[2][lane];
+        increment[1][lane] = t95;
+        increment[2][lane] = t96;
+        displacement[0][lane] = t94 * (p_z1 * t95 - p_y1 * t96) - 0.5 * t97;
+        displacement[1][lane] = t94 * (p_x1 * t96 - p_z1 * t97) - 0.5 * t95;
+        displacement[2][lane] = t94 * (p_y1 * t97 - p_x1 * t95) - 0.5 * t96;
+        increment[0][lane] = t97;
+        increment[4][lane] = t126;
+        increment[5][lane] = t138;
+        displacement[3][lane] = (p_z2 * t126 - p_y2 * t138) * t139 - 0.5 * t140;
+        displacement[4][lane] = (p_x2 * t138 - p_z2 * t140) * t139 - 0.5 * t126;
+        displacement[5][lane] = (p_y2 * t140 - p_x2 * t126) * t139 - 0.5 * t138;
+        increment[3][lane] = t140;
+        increment[7][lane] = work[18][lane];
+    }
+}
+
+/* spin_chain5_evaluate_lanes_part2 (part 2 of 2) */
+spin_chain5_APART static void spin_chain5_evaluate_lanes_part2(spin_chain5_lanes coef[restrict 33],
+                                                               spin_chain5_lanes y[restrict 15],
+                                                               spin_chain5_lanes displacement[restrict 15],
+                                                               spin_chain5_lanes increment[restrict 15],
+                                                               spin_chain5_lanes work[restrict 86])
+{
+    spin_chain5_EACH_LANE
+    for (int lane = 0; lane < spin_chain5_LANES; ++lane) {
+        const double x1 = y[0][lane];
+        const double y1_ = y[1][lane];
+        const double z1 = y[2][lane];
+        const double x2 = y[3][lane];
+        const double y2 = y[4][lane];
+        const double z2 = y[5][lane];
+        const double x3 = y[6][lane];
+        const double y3 = y[7][lane];
+        const double z3 = y[8][lane];
+        const double x4 = y[9][lane];
+        const double y4 = y[10][lane];
+        const double z4 = y[11][lane];
+        const double x5 = y[12][lane];
+        const double y5 = y[13][lane];
+        const double z5 = y[14][lane];
+        const double t180 = coef[25][lane] * y3;
+        const double t181 = coef[21][lane] * y5 + t180;
+        const double t182 = coef[0][lane] * y4;
+        const double t183 = z1 * work[0][lane];
+        const double t184 = z3 * work[1][lane];
+        const double t185 = z5 * work[2][lane];
+        const double t186 = x4 * (work[3][lane] + (work[4][lane] + (work[5][lane] + x4 * t181))) + (t182 + (coef[24][lane] * y3 + work[6][lane]) + z4 * (t183 + (t184 + (z4 * t181 + t185))));
+        const double p_y3 = x2 * (y1_ * work[7][lane] + (work[8][lane] + (work[9][lane] + (work[10][lane] + y3 * work[11][lane])))) + (z2 * (y1_ * work[12][lane] + (work[13][lane] + (y3 * work[14][lane] + work[15][lane]))) + t186);
+        const double t187 = x3 * p_y3 - y3 * work[16][lane];
+        const double t188 = spin_chain5_phi0_lane(work[17][lane] * work[17][lane] + (work[16][lane] * work[16][lane] + p_y3 * p_y3));
+        const double t189 = y3 * work[17][lane] - z3 * p_y3;
+        const double t190 = work[19][lane] + (coef[14][lane] * x3 + coef[3][lane] * x1);
+        const double t191 = coef[30][lane] * x5 + work[20][lane];
+        const double t192 = work[21][lane] + (coef[14][lane] * y3 + coef[3][lane] * y1_);
+        const double t193 = coef[30][lane] * y5 + t180;
+        const double t194 = work[22][lane] + work[23][lane];
+        const double t195 = x1 * t194;
+        const double t196 = coef[3][lane] * x2;
+        const double t197 = coef[2][lane] * x5 + t196;
+        const double t198 = work[24][lane] + work[25][lane];
+        const double t199 = coef[27][lane] * work[26][lane] + coef[29][lane] * work[27][lane] + z3 * t198;
+        const double t200 = y1_ * t194;
+        const double t201 = coef[3][lane] * y2;
+        const double t202 = coef[2][lane] * y5 + t201;
+        const double t203 = work[28][lane] + work[29][lane];
+        const double t204 = coef[29][lane] * work[30][lane] + coef[27][lane] * work[31][lane] + z3 * t203;
+        const double t205 = y3 * (z2 * t192 + (t183 + (t184 + (t185 + z4 * t193)))) + (x5 * (t195 + (z1 * t197 + t199)) + (work[32][lane] + (work[33][lane] + coef[28][lane] * z4) + y5 * (t200 + (z1 * t202 + t204))));
+        const double p_z4 = x3 * (z2 * t190 + (work[34][lane] + (work[35][lane] + (work[36][lane] + z4 * t191)))) + t205;
+        const double t206 = work[37][lane] + (coef[3][lane] * z1 + coef[14][lane] * z3);
+        const double t207 = work[38][lane] + coef[30][lane] * z5;
+        const double t208 = work[24][lane] + work[39][lane];
+        const double t209 = y1_ * t208;
+        const double t210 = x3 * t203;
+        const double t211 = coef[27][lane] * work[40][lane] + coef[29][lane] * work[41][lane];
+        const double t212 = coef[3][lane] * z2;
+        const double t213 = coef[2][lane] * z5 + t212;
+        const double t214 = z1 * t208;
+        const double t215 = coef[27][lane] * work[27][lane] + coef[29][lane] * work[26][lane];
+        const double t216 = work[42][lane] + work[23][lane];
+        const double t217 = x3 * t216;
+        const double t218 = y5 * (x1 * t202 + (t209 + (t210 + t211))) + (work[43][lane] + (coef[28][lane] * x4 + work[44][lane]) + z5 * (x1 * t213 + (t214 + (t215 + t217))));
+        const double p_x4 = y3 * (x2 * t192 + (work[3][lane] + (work[4][lane] + (work[5][lane] + x4 * t193)))) + (z3 * (x2 * t206 + (work[45][lane] + (work[46][lane] + (x4 * t207 + work[47][lane])))) + t218);
+        const double t219 = work[29][lane] + work[48][lane];
+        const double t220 = x1 * t219;
+        const double t221 = coef[27][lane] * work[41][lane] + coef[29][lane] * work[40][lane] + y3 * t198;
+        const double t222 = z1 * t219;
+        const double t223 = coef[29][lane] * work[31][lane] + coef[27][lane] * work[30][lane];
+        const double t224 = y3 * t216;
+        const double t225 = z3 * (y2 * t206 + (work[49][lane] + (work[50][lane] + (y4 * t207 + work[51][lane])))) + (x5 * (t220 + (y1_ * t197 + t221)) + (work[52][lane] + (work[53][lane] + coef[28][lane] * y4) + z5 * (y1_ * t213 + (t222 + (t223 + t224)))));
+        const double p_y4 = x3 * (y2 * t190 + (work[54][lane] + (work[55][lane] + (y4 * t191 + work[56][lane])))) + t225;
+        const double t226 = spin_chain5_phi0_lane(p_z4 * p_z4 + (p_x4 * p_x4 + p_y4 * p_y4));
+        const double t227 = z4 * p_x4 - x4 * p_z4;
+        const double t228 = x4 * p_y4 - y4 * p_x4;
+        const double t229 = y4 * p_z4 - z4 * p_y4;
+        const double t230 = work[57][lane] + (coef[20][lane] * x1 + coef[3][lane] * x3);
+        const double t231 = work[58][lane] + coef[32][lane] * x4;
+        const double t232 = work[59][lane] + (coef[3][lane] * y3 + coef[20][lane] * y1_);
+        const double t233 = coef[32][lane] * y4 + work[60][lane];
+        const double t234 = coef[21][lane] * x4 + t196;
+        const double t235 = coef[21][lane] * y4 + t201;
+        const double t236 = x4 * (t214 + (t217 + (t215 + z3 * t234))) + (coef[31][lane] * z5 + (work[61][lane] + work[62][lane]) + y4 * (t222 + (t224 + (z3 * t235 + t223))));
+        const double p_z5 = x1 * (z2 * t230 + (work[63][lane] + (work[64][lane] + (z5 * t231 + work[65][lane])))) + (y1_ * (z2 * t232 + (work[66][lane] + (work[67][lane] + (z5 * t233 + work[68][lane])))) + t236);
+        const double t237 = work[69][lane] + (coef[3][lane] * z3 + coef[20][lane] * z1);
+        const double t238 = work[70][lane] + coef[32][lane] * z4;
+        const double t239 = coef[21][lane] * z4 + t212;
+        const double t240 = z1 * (x2 * t237 + (work[71][lane] + (work[72][lane] + (work[73][lane] + x5 * t238)))) + (y4 * (t220 + (x3 * t235 + t221)) + (coef[31][lane] * x5 + (work[74][lane] + work[75][lane]) + z4 * (t195 + (x3 * t239 + t199))));
+        const double p_x5 = y1_ * (x2 * t232 + (work[76][lane] + (work[77][lane] + (x5 * t233 + work[78][lane])))) + t240;
+        const double t241 = z1 * (y2 * t237 + (work[79][lane] + (work[80][lane] + (y5 * t238 + work[81][lane])))) + (x4 * (t209 + (t210 + (t211 + y3 * t234))) + (coef[31][lane] * y5 + (work[82][lane] + t182) + z4 * (t200 + (y3 * t239 + t204))));
+        const double p_y5 = x1 * (y2 * t230 + (work[83][lane] + (work[84][lane] + (work[85][lane] + y5 * t231)))) + t241;
+        const double t242 = spin_chain5_phi0_lane(p_z5 * p_z5 + (p_x5 * p_x5 + p_y5 * p_y5));
+        const double t243 = z5 * p_x5 - x5 * p_z5;
+        const double t244 = x5 * p_y5 - y5 * p_x5;
+        const double t245 = y5 * p_z5 - z5 * p_y5;
+        increment[8][lane] = t187;
+        displacement[6][lane] = (work[17][lane] * work[18][lane] - p_y3 * t187) * t188 - 0.5 * t189;
+        displacement[7][lane] = (work[16][lane] * t187 - work[17][lane] * t189) * t188 - 0.5 * work[18][lane];
+        displacement[8][lane] = (p_y3 * t189 - work[16][lane] * work[18][lane]) * t188 - 0.5 * t187;
+        increment[6][lane] = t189;
+        increment[10][lane] = t227;
+        increment[11][lane] = t228;
+        displacement[9][lane] = t226 * (p_z4 * t227 - p_y4 * t228) - 0.5 * t229;
+        displacement[10][lane] = (p_x4 * t228 - p_z4 * t229) * t226 - 0.5 * t227;
+        displacement[11][lane] = t226 * (p_y4 * t229 - p_x4 * t227) - 0.5 * t228;
+        increment[9][lane] = t229;
+        increment[13][lane] = t243;
+        increment[14][lane] = t244;
+        displacement[12][lane] = t242 * (p_z5 * t243 - p_y5 * t244) - 0.5 * t245;
+        displacement[13][lane] = (p_x5 * t244 - p_z5 * t245) * t242 - 0.5 * t243;
+        displacement[14][lane] = t242 * (p_y5 * t245 - p_x5 * t243) - 0.5 * t244;
+        increment[12][lane] = t245;
+    }
+}
+
+/* spin_chain5_evaluate in all lanes. */
+static void spin_chain5_evaluate_lanes(spin_chain5_lanes coef[restrict 33], spin_chain5_lanes y[restrict 15],
+                                       spin_chain5_lanes displacement[restrict 15],
+                                       spin_chain5_lanes increment[restrict 15])
+{
+    spin_chain5_lanes work[86];
+    spin_chain5_evaluate_lanes_part1(coef, y, displacement, increment, work);
+    spin_chain5_evaluate_lanes_part2(coef, y, displacement, increment, work);
+}
+
 /* Invert the matrices of all lanes in place by elimination without pivoting: they are I + O(h). Infinite where a pivot is
    far from 1. */
 static void spin_chain5_invert(spin_chain5_lanes matrix[restrict 225])
@@ -4190,6 +4546,23 @@ static double spin_chain5_largest(const spin_chain5_lanes size)
     return isfinite(total) ? largest : HUGE_VAL;
 }
 
+/* What is left after a correction of this size: quadratic in it, where the matrices are of the points corrected; where
+   they are of points further off, by bend, also of the order of size times bend. bound is what the last pass left. */
+static double spin_chain5_remaining(double size, double bend, double bound)
+{
+    const double growth = size / bound, left = size * (size + bend);
+    return growth > 1.0 ? growth * left : left;
+}
+
+/* The table of a stage, with its matrices or with those of the last pass. */
+static void spin_chain5_update(spin_chain5_lanes coef[restrict], spin_chain5_lines *line, int matrices)
+{
+    if (matrices)
+        spin_chain5_tabulate(coef, line);
+    else
+        spin_chain5_evaluate_lanes(coef, line->y, line->displacement, line->increment);
+}
+
 /* The steps of a block one after the other, each along the lines of its lane. As X, the state with its carry, gains
    increment - gain residual, the next residual follows from this one; X itself is added up apart. */
 static void spin_chain5_chain(spin_chain5_lines line[1], double x[15], double carry[15])
@@ -4252,8 +4625,9 @@ static void spin_chain5_foresee(const spin_chain5_memory *memory, spin_chain5_la
     }
 }
 
-/* Guesses where no recurrence is known: midpoints of steps by the classical Runge-Kutta method. */
-static void spin_chain5_march(const spin_chain5_solver *s, spin_chain5_lines line[1])
+/* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
+   method, to leading order. */
+static void spin_chain5_march(const spin_chain5_solver *s, spin_chain5_table *table, spin_chain5_lines line[1])
 {
     static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
     double x[15], point[15], slope[15], mean[15];
@@ -4274,6 +4648,15 @@ static void spin_chain5_march(const spin_chain5_solver *s, spin_chain5_lines lin
             x[i] += h * mean[i];
         }
     }
+    for (int stage = 0; stage < 1; ++stage) {
+        spin_chain5_lines *at = &line[stage];
+        spin_chain5_evaluate_lanes(table->coef[stage], at->y, at->displacement, at->increment);
+        for (int i = 0; i < 15; ++i) {
+            spin_chain5_EACH_LANE
+            for (int lane = 0; lane < spin_chain5_LANES; ++lane)
+                at->y[i][lane] -= at->displacement[i][lane] + 0.5 * at->increment[i][lane];
+        }
+    }
 }
 
 /* spin_chain5_LANES steps at once: guess the points of all, and correct them together until the error that remains is as
@@ -4282,14 +4665,15 @@ static int spin_chain5_block(spin_chain5_solver *s, spin_chain5_table *table, in
 {
     spin_chain5_lines line[1];
     spin_chain5_lanes sizes;
-    double x[15], carry[15], value[15], previous = HUGE_VAL;
+    double x[15], carry[15], value[15], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
-    if (!s->foreseeing) spin_chain5_march(s, line);
+    if (!s->foreseeing) spin_chain5_march(s, table, line);
     for (int stage = 0; stage < 1 && s->foreseeing; ++stage)
         spin_chain5_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
     while (!solved) {
         double size = 0.0;
-        for (int stage = 0; stage < 1; ++stage) spin_chain5_tabulate(table->coef[stage], &line[stage]);
+        const int matrices = previous > 1e-05;
+        for (int stage = 0; stage < 1; ++stage) spin_chain5_update(table->coef[stage], &line[stage], matrices);
         memcpy(x, s->x, sizeof x);
         memcpy(carry, s->carry, sizeof carry);
         spin_chain5_chain(line, x, carry);
@@ -4298,9 +4682,10 @@ static int spin_chain5_block(spin_chain5_solver *s, spin_chain5_table *table, in
             size = fmax(size, spin_chain5_largest(sizes));
         }
         s->evaluations += 1 * spin_chain5_LANES;
-        const double growth = size / (previous * previous);
+        bend = matrices ? 0.0 : bend + previous;
+        bound = spin_chain5_remaining(size, bend, bound);
         /* The second test: after the square of so small a correction there is rounding only. */
-        solved = size * size * (growth > 1.0 ? growth : 1.0) <= 1e-20 || (previous < 1e-8 && size < 1e-10);
+        solved = bound <= 1e-20 || (previous < 1e-8 && size < 1e-10);
         if ((++passes >= most || !(size < previous)) && !solved) return 0;
         previous = size;
     }
@@ -4330,26 +4715,28 @@ static void spin_chain5_choose_guess(spin_chain5_solver *s, size_t steps)
             s->foreseeing = 0;
             return;
         }
-    if (s->foreseeing || (steps < 4000 && s->steps < 4000) || s->steps < s->retry) return;
+    if (s->foreseeing || (steps < 4000 && s->steps < 1000) || s->steps < s->retry) return;
     for (int stage = 0; stage < 1; ++stage) spin_chain5_fit(&s->memory[stage]);
     s->foreseeing = 1;
     s->pause = spin_chain5_LANES;
 }
 
-/* Learn from a block: recurrences that guess no better than steps by Runge-Kutta are given up for a while, and so are
-   blocks that fail with those. */
+/* Learn from a block: after one that failed single steps are made, the more the more often that happens. Recurrences
+   that fail repeatedly, or need more passes than steps by Runge-Kutta did, are given up for a while. */
 static void spin_chain5_learn_from(spin_chain5_solver *s, int passes)
 {
-    if (s->foreseeing && (passes == 0 || (passes > 1 && passes >= s->passes))) {
-        s->foreseeing = 0;
-        s->doubt = 2 * s->doubt + 4000;
-        s->retry = s->steps + s->doubt;
-    } else if (passes == 0) {
+    if (passes > 0) {
+        s->setback /= 2;
+    } else {
         s->setback = 2 * s->setback + spin_chain5_LANES > 1000 ? 1000 : 2 * s->setback + spin_chain5_LANES;
         s->pause = s->setback;
-    } else {
-        s->setback /= 2;
-        if (!s->foreseeing) s->passes = passes;
+    }
+    if (!s->foreseeing) {
+        s->passes = passes > 0 ? passes : INT_MAX;
+    } else if (passes > s->passes || s->setback > 5 * spin_chain5_LANES) {
+        s->foreseeing = s->setback = s->pause = 0;
+        s->doubt = 2 * s->doubt + 4000;
+        s->retry = s->steps + s->doubt;
     }
 }
 
@@ -4499,14 +4886,15 @@ static void spin_chain5_group_fit(spin_chain5_group *group)
     group->patience = group->patience < 10000 ? 2 * group->patience + 1000 : 20000;
 }
 
-/* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group. */
-static int spin_chain5_group_open(spin_chain5_group *group, const spin_chain5_lanes size, const spin_chain5_lanes previous)
+/* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group.
+   bound is what remains in each lane. */
+static int spin_chain5_group_open(spin_chain5_group *group, const spin_chain5_lanes size, const spin_chain5_lanes previous,
+    double bend, spin_chain5_lanes bound)
 {
     int open = 0;
     for (int lane = 0; lane < spin_chain5_LANES; ++lane) {
-        const double growth = size[lane] / (previous[lane] * previous[lane]);
-        const double remaining = size[lane] * size[lane] * (growth > 1.0 ? growth : 1.0);
-        const int solved = remaining <= 1e-20 || (previous[lane] < 1e-8 && size[lane] < 1e-10);
+        bound[lane] = spin_chain5_remaining(size[lane], bend, bound[lane]);
+        const int solved = bound[lane] <= 1e-20 || (previous[lane] < 1e-8 && size[lane] < 1e-10);
         if (!isfinite(size[lane])) group->active[lane] = 0;
         open += group->active[lane] && !solved;
     }
@@ -4517,14 +4905,16 @@ static int spin_chain5_group_open(spin_chain5_group *group, const spin_chain5_la
    allowed, lanes that are not solved leave the group. */
 static int spin_chain5_group_solve(spin_chain5_group *group, int stage, spin_chain5_lines *line)
 {
-    spin_chain5_lanes size, previous;
+    spin_chain5_lanes size, previous, bound;
+    double largest = HUGE_VAL, bend = 0.0;
     int iterations = 0, open = 1;
-    for (int lane = 0; lane < spin_chain5_LANES; ++lane) size[lane] = HUGE_VAL;
+    for (int lane = 0; lane < spin_chain5_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
     if (group->fitting[stage]) spin_chain5_group_foresee(group, stage, line->y);
     else spin_chain5_group_extrapolate(group, stage, line->y);
     for (; open > 0 && iterations < 20; ++iterations) {
         memcpy(previous, size, sizeof size);
-        spin_chain5_tabulate(group->coef[stage], line);
+        spin_chain5_update(group->coef[stage], line, largest > 1e-05);
+        bend = largest > 1e-05 ? 0.0 : bend + largest;
         for (int i = 0; i < 15; ++i) {
             spin_chain5_EACH_LANE
             for (int lane = 0; lane < spin_chain5_LANES; ++lane)
@@ -4532,10 +4922,11 @@ static int spin_chain5_group_solve(spin_chain5_group *group, int stage, spin_cha
                     ((line->y[i][lane] - group->x[i][lane]) + line->displacement[i][lane]) - group->carry[i][lane];
         }
         spin_chain5_correct(line, size);
-        open = spin_chain5_group_open(group, size, previous);
+        open = spin_chain5_group_open(group, size, previous, bend, bound);
+        largest = spin_chain5_largest(size);
     }
     for (int lane = 0; lane < spin_chain5_LANES && open > 0; ++lane)
-        group->active[lane] = group->active[lane] && size[lane] * size[lane] <= 1e-20;
+        group->active[lane] = group->active[lane] && bound[lane] <= 1e-20;
     return iterations;
 }
 

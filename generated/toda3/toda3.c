@@ -13,11 +13,12 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 35f379f81e9f9c6f8f0c4eafb9658867740961f89dba0baa6d7115de349542cd
+ * body-sha256: 3ec2e55411c8b42e41bc00cba4c3b2851572cdc2278a3fce4f11073677276030
  */
 #include "toda3.h"
 
 #include <float.h>
+#include <limits.h>
 #include <math.h>
 #include <stdint.h>
 #include <string.h>
@@ -566,6 +567,7 @@ static toda3_status toda3_set_step(toda3_solver *s, double h)
     s->setback = s->foreseeing = 0;
     s->doubt = s->retry = 0;
     s->effort = 0.0;
+    s->passes = INT_MAX;
     s->h = h;
     s->ready = 1;
     return toda3_OK;
@@ -839,6 +841,53 @@ static void toda3_linearise_lanes(toda3_lanes coef[restrict 10], toda3_lanes y[r
     }
 }
 
+/* toda3_evaluate in all lanes. */
+static void toda3_evaluate_lanes(toda3_lanes coef[restrict 10], toda3_lanes y[restrict 5],
+                                 toda3_lanes displacement[restrict 5], toda3_lanes increment[restrict 5])
+{
+    toda3_EACH_LANE
+    for (int lane = 0; lane < toda3_LANES; ++lane) {
+        const double a1 = y[0][lane];
+        const double a2 = y[1][lane];
+        const double b1 = y[2][lane];
+        const double b2 = y[3][lane];
+        const double b3 = y[4][lane];
+        const double t1 = a2 * a2;
+        const double t2 = b2 * coef[6][lane];
+        const double p_b3 = b3 * coef[5][lane] + t1 * (t2 + b3 * coef[1][lane]);
+        const double t3 = a1 * a1;
+        const double p_b2 = coef[6][lane] * (b1 * t3) + coef[6][lane] * (b3 * t1) + b2 * (coef[1][lane] * t1 + (coef[5][lane] + coef[1][lane] * t3));
+        const double t4 = p_b3 - p_b2;
+        const double t5 = t4 + (p_b2 - p_b3);
+        const double t6 = toda3_phi0_lane(p_b2 * (2.0 * p_b3 - p_b2) - p_b3 * p_b3);
+        const double t7 = b1 * coef[1][lane];
+        const double p_b1 = b1 * coef[5][lane] + t3 * (t2 + t7);
+        const double t8 = p_b2 - p_b1;
+        const double t9 = a1 * t8;
+        const double t10 = toda3_phi0_lane(p_b1 * (2.0 * p_b2 - p_b1) - p_b2 * p_b2);
+        const double t11 = a1 * p_b2 - a1 * p_b1;
+        const double t12 = a2 * t4;
+        const double t13 = a2 * p_b3 - a2 * p_b2;
+        const double p_a1 = a1 * (b1 * (t7 + b2 * coef[2][lane]) + (coef[0][lane] + coef[4][lane] * t3 + (coef[3][lane] * t1 + coef[1][lane] * (b2 * b2))));
+        const double t14 = p_a1 * t9 * t10;
+        const double t15 = a1 * p_a1;
+        const double p_a2 = a2 * (b2 * (b2 * coef[1][lane] + b3 * coef[2][lane]) + (coef[0][lane] + coef[3][lane] * t3 + (coef[4][lane] * t1 + coef[1][lane] * (b3 * b3))));
+        const double t16 = p_a2 * t12 * t6;
+        const double t17 = a2 * p_a2;
+        const double t18 = t17 - t15;
+        displacement[0][lane] = t5 * (a1 * t5) * t6 + t8 * t9 * t10 - 0.5 * t11;
+        displacement[1][lane] = t4 * t12 * t6 - 0.5 * t13;
+        displacement[2][lane] = t14 - 0.5 * t15;
+        displacement[3][lane] = t16 - t14 - 0.5 * t18;
+        displacement[4][lane] = 0.5 * t17 - t16;
+        increment[0][lane] = t11;
+        increment[1][lane] = t13;
+        increment[2][lane] = t15;
+        increment[3][lane] = t18;
+        increment[4][lane] = -t17;
+    }
+}
+
 /* Invert the matrices of all lanes in place by elimination without pivoting: they are I + O(h). Infinite where a pivot is
    far from 1. */
 static void toda3_invert(toda3_lanes matrix[restrict 25])
@@ -928,6 +977,23 @@ static double toda3_largest(const toda3_lanes size)
     return isfinite(total) ? largest : HUGE_VAL;
 }
 
+/* What is left after a correction of this size: quadratic in it, where the matrices are of the points corrected; where
+   they are of points further off, by bend, also of the order of size times bend. bound is what the last pass left. */
+static double toda3_remaining(double size, double bend, double bound)
+{
+    const double growth = size / bound, left = size * (size + bend);
+    return growth > 1.0 ? growth * left : left;
+}
+
+/* The table of a stage, with its matrices or with those of the last pass. */
+static void toda3_update(toda3_lanes coef[restrict], toda3_lines *line, int matrices)
+{
+    if (matrices)
+        toda3_tabulate(coef, line);
+    else
+        toda3_evaluate_lanes(coef, line->y, line->displacement, line->increment);
+}
+
 /* The steps of a block one after the other, each along the lines of its lane. As X, the state with its carry, gains
    increment - gain residual, the next residual follows from this one; X itself is added up apart. */
 static void toda3_chain(toda3_lines line[1], double x[5], double carry[5])
@@ -990,8 +1056,9 @@ static void toda3_foresee(const toda3_memory *memory, toda3_lanes weight[restric
     }
 }
 
-/* Guesses where no recurrence is known: midpoints of steps by the classical Runge-Kutta method. */
-static void toda3_march(const toda3_solver *s, toda3_lines line[1])
+/* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
+   method, to leading order. */
+static void toda3_march(const toda3_solver *s, toda3_table *table, toda3_lines line[1])
 {
     static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
     double x[5], point[5], slope[5], mean[5];
@@ -1012,6 +1079,15 @@ static void toda3_march(const toda3_solver *s, toda3_lines line[1])
             x[i] += h * mean[i];
         }
     }
+    for (int stage = 0; stage < 1; ++stage) {
+        toda3_lines *at = &line[stage];
+        toda3_evaluate_lanes(table->coef[stage], at->y, at->displacement, at->increment);
+        for (int i = 0; i < 5; ++i) {
+            toda3_EACH_LANE
+            for (int lane = 0; lane < toda3_LANES; ++lane)
+                at->y[i][lane] -= at->displacement[i][lane] + 0.5 * at->increment[i][lane];
+        }
+    }
 }
 
 /* toda3_LANES steps at once: guess the points of all, and correct them together until the error that remains is as
@@ -1020,14 +1096,15 @@ static int toda3_block(toda3_solver *s, toda3_table *table, int most)
 {
     toda3_lines line[1];
     toda3_lanes sizes;
-    double x[5], carry[5], value[5], previous = HUGE_VAL;
+    double x[5], carry[5], value[5], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
-    if (!s->foreseeing) toda3_march(s, line);
+    if (!s->foreseeing) toda3_march(s, table, line);
     for (int stage = 0; stage < 1 && s->foreseeing; ++stage)
         toda3_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
     while (!solved) {
         double size = 0.0;
-        for (int stage = 0; stage < 1; ++stage) toda3_tabulate(table->coef[stage], &line[stage]);
+        const int matrices = previous > 1e-05;
+        for (int stage = 0; stage < 1; ++stage) toda3_update(table->coef[stage], &line[stage], matrices);
         memcpy(x, s->x, sizeof x);
         memcpy(carry, s->carry, sizeof carry);
         toda3_chain(line, x, carry);
@@ -1036,9 +1113,10 @@ static int toda3_block(toda3_solver *s, toda3_table *table, int most)
             size = fmax(size, toda3_largest(sizes));
         }
         s->evaluations += 1 * toda3_LANES;
-        const double growth = size / (previous * previous);
+        bend = matrices ? 0.0 : bend + previous;
+        bound = toda3_remaining(size, bend, bound);
         /* The second test: after the square of so small a correction there is rounding only. */
-        solved = size * size * (growth > 1.0 ? growth : 1.0) <= 1e-20 || (previous < 1e-8 && size < 1e-10);
+        solved = bound <= 1e-20 || (previous < 1e-8 && size < 1e-10);
         if ((++passes >= most || !(size < previous)) && !solved) return 0;
         previous = size;
     }
@@ -1068,26 +1146,28 @@ static void toda3_choose_guess(toda3_solver *s, size_t steps)
             s->foreseeing = 0;
             return;
         }
-    if (s->foreseeing || (steps < 4000 && s->steps < 4000) || s->steps < s->retry) return;
+    if (s->foreseeing || (steps < 4000 && s->steps < 1000) || s->steps < s->retry) return;
     for (int stage = 0; stage < 1; ++stage) toda3_fit(&s->memory[stage]);
     s->foreseeing = 1;
     s->pause = toda3_LANES;
 }
 
-/* Learn from a block: recurrences that guess no better than steps by Runge-Kutta are given up for a while, and so are
-   blocks that fail with those. */
+/* Learn from a block: after one that failed single steps are made, the more the more often that happens. Recurrences
+   that fail repeatedly, or need more passes than steps by Runge-Kutta did, are given up for a while. */
 static void toda3_learn_from(toda3_solver *s, int passes)
 {
-    if (s->foreseeing && (passes == 0 || (passes > 1 && passes >= s->passes))) {
-        s->foreseeing = 0;
-        s->doubt = 2 * s->doubt + 4000;
-        s->retry = s->steps + s->doubt;
-    } else if (passes == 0) {
+    if (passes > 0) {
+        s->setback /= 2;
+    } else {
         s->setback = 2 * s->setback + toda3_LANES > 1000 ? 1000 : 2 * s->setback + toda3_LANES;
         s->pause = s->setback;
-    } else {
-        s->setback /= 2;
-        if (!s->foreseeing) s->passes = passes;
+    }
+    if (!s->foreseeing) {
+        s->passes = passes > 0 ? passes : INT_MAX;
+    } else if (passes > s->passes || s->setback > 5 * toda3_LANES) {
+        s->foreseeing = s->setback = s->pause = 0;
+        s->doubt = 2 * s->doubt + 4000;
+        s->retry = s->steps + s->doubt;
     }
 }
 
@@ -1236,14 +1316,15 @@ static void toda3_group_fit(toda3_group *group)
     group->patience = group->patience < 10000 ? 2 * group->patience + 1000 : 20000;
 }
 
-/* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group. */
-static int toda3_group_open(toda3_group *group, const toda3_lanes size, const toda3_lanes previous)
+/* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group.
+   bound is what remains in each lane. */
+static int toda3_group_open(toda3_group *group, const toda3_lanes size, const toda3_lanes previous,
+    double bend, toda3_lanes bound)
 {
     int open = 0;
     for (int lane = 0; lane < toda3_LANES; ++lane) {
-        const double growth = size[lane] / (previous[lane] * previous[lane]);
-        const double remaining = size[lane] * size[lane] * (growth > 1.0 ? growth : 1.0);
-        const int solved = remaining <= 1e-20 || (previous[lane] < 1e-8 && size[lane] < 1e-10);
+        bound[lane] = toda3_remaining(size[lane], bend, bound[lane]);
+        const int solved = bound[lane] <= 1e-20 || (previous[lane] < 1e-8 && size[lane] < 1e-10);
         if (!isfinite(size[lane])) group->active[lane] = 0;
         open += group->active[lane] && !solved;
     }
@@ -1254,14 +1335,16 @@ static int toda3_group_open(toda3_group *group, const toda3_lanes size, const to
    allowed, lanes that are not solved leave the group. */
 static int toda3_group_solve(toda3_group *group, int stage, toda3_lines *line)
 {
-    toda3_lanes size, previous;
+    toda3_lanes size, previous, bound;
+    double largest = HUGE_VAL, bend = 0.0;
     int iterations = 0, open = 1;
-    for (int lane = 0; lane < toda3_LANES; ++lane) size[lane] = HUGE_VAL;
+    for (int lane = 0; lane < toda3_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
     if (group->fitting[stage]) toda3_group_foresee(group, stage, line->y);
     else toda3_group_extrapolate(group, stage, line->y);
     for (; open > 0 && iterations < 20; ++iterations) {
         memcpy(previous, size, sizeof size);
-        toda3_tabulate(group->coef[stage], line);
+        toda3_update(group->coef[stage], line, largest > 1e-05);
+        bend = largest > 1e-05 ? 0.0 : bend + largest;
         for (int i = 0; i < 5; ++i) {
             toda3_EACH_LANE
             for (int lane = 0; lane < toda3_LANES; ++lane)
@@ -1269,10 +1352,11 @@ static int toda3_group_solve(toda3_group *group, int stage, toda3_lines *line)
                     ((line->y[i][lane] - group->x[i][lane]) + line->displacement[i][lane]) - group->carry[i][lane];
         }
         toda3_correct(line, size);
-        open = toda3_group_open(group, size, previous);
+        open = toda3_group_open(group, size, previous, bend, bound);
+        largest = toda3_largest(size);
     }
     for (int lane = 0; lane < toda3_LANES && open > 0; ++lane)
-        group->active[lane] = group->active[lane] && size[lane] * size[lane] <= 1e-20;
+        group->active[lane] = group->active[lane] && bound[lane] <= 1e-20;
     return iterations;
 }
 

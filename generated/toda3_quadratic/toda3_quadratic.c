@@ -12,11 +12,12 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 9ad14be817d8bfba13c653402c6287c25ae72d268f2a33d398d26770eff27f4c
+ * body-sha256: a11798219ae87fe9e133898b42f9b9a08feb7eafef5df5b5d8a1533f6c3aeaf5
  */
 #include "toda3_quadratic.h"
 
 #include <float.h>
+#include <limits.h>
 #include <math.h>
 #include <stdint.h>
 #include <string.h>

@@ -13,11 +13,12 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: b377075fab060cc8318aad5fb8679e2f748d3c341aacdf426722c7d2c1866a52
+ * body-sha256: 664542bf26291dd41ecac6b02c826d801762e222bd3b1fcb358a053b6838aa1c
  */
 #include "volterra5.h"
 
 #include <float.h>
+#include <limits.h>
 #include <math.h>
 #include <stdint.h>
 #include <string.h>
@@ -476,6 +477,7 @@ static volterra5_status volterra5_set_step(volterra5_solver *s, double h)
     s->setback = s->foreseeing = 0;
     s->doubt = s->retry = 0;
     s->effort = 0.0;
+    s->passes = INT_MAX;
     s->h = h;
     s->ready = 1;
     return volterra5_OK;
@@ -738,6 +740,62 @@ static void volterra5_linearise_lanes(volterra5_lanes coef[restrict 4], volterra
     }
 }
 
+/* volterra5_evaluate in all lanes. */
+static void volterra5_evaluate_lanes(volterra5_lanes coef[restrict 4], volterra5_lanes y[restrict 5],
+                                     volterra5_lanes displacement[restrict 5],
+                                     volterra5_lanes increment[restrict 5])
+{
+    volterra5_EACH_LANE
+    for (int lane = 0; lane < volterra5_LANES; ++lane) {
+        const double v1 = y[0][lane];
+        const double v2 = y[1][lane];
+        const double v3 = y[2][lane];
+        const double v4 = y[3][lane];
+        const double v5 = y[4][lane];
+        const double t1 = coef[2][lane] * v4;
+        const double t2 = coef[3][lane] * v5;
+        const double t3 = coef[1][lane] * v1;
+        const double t4 = coef[2][lane] * v2;
+        const double t5 = coef[1][lane] * v4;
+        const double t6 = coef[2][lane] * v3;
+        const double p_v5 = v1 * (t1 + t2 + (t3 + t4)) + (coef[0][lane] + v4 * (t2 + (t5 + t6)));
+        const double t7 = v5 * p_v5;
+        const double t8 = coef[2][lane] * v5;
+        const double t9 = t8 + t6;
+        const double t10 = coef[3][lane] * v2;
+        const double t11 = coef[1][lane] * v3;
+        const double p_v2 = v1 * (t9 + (t10 + t3)) + (coef[0][lane] + v3 * (t1 + (t10 + t11)));
+        const double t12 = v2 * p_v2;
+        const double t13 = volterra5_expm1_lane(0.5 * (t7 - t12));
+        const double t14 = coef[3][lane] * v1;
+        const double t15 = coef[1][lane] * v2;
+        const double t16 = coef[1][lane] * v5;
+        const double p_v1 = v2 * (t9 + (t14 + t15)) + (coef[0][lane] + v5 * (t16 + (t14 + t1)));
+        const double t17 = v1 * p_v1;
+        const double t18 = coef[3][lane] * v3;
+        const double t19 = coef[2][lane] * v1;
+        const double p_v3 = v2 * (t18 + t1 + (t15 + t19)) + (coef[0][lane] + v4 * (t8 + (t5 + t18)));
+        const double t20 = v3 * p_v3;
+        const double t21 = volterra5_expm1_lane(0.5 * (t17 - t20));
+        const double t22 = coef[3][lane] * v4;
+        const double p_v4 = v3 * (t8 + t22 + (t11 + t4)) + (coef[0][lane] + v5 * (t16 + (t22 + t19)));
+        const double t23 = v4 * p_v4;
+        const double t24 = volterra5_expm1_lane(0.5 * (t12 - t23));
+        const double t25 = volterra5_expm1_lane(0.5 * (t20 - t7));
+        const double t26 = volterra5_expm1_lane(0.5 * (t23 - t17));
+        displacement[0][lane] = v1 * t13;
+        displacement[1][lane] = v2 * t21;
+        displacement[2][lane] = v3 * t24;
+        displacement[3][lane] = v4 * t25;
+        displacement[4][lane] = v5 * t26;
+        increment[0][lane] = -(v1 * (t13 * (1.0 + 1.0 / (1.0 + t13))));
+        increment[1][lane] = -(v2 * (t21 * (1.0 + 1.0 / (1.0 + t21))));
+        increment[2][lane] = -(v3 * (t24 * (1.0 + 1.0 / (1.0 + t24))));
+        increment[3][lane] = -(v4 * (t25 * (1.0 + 1.0 / (1.0 + t25))));
+        increment[4][lane] = -(v5 * (t26 * (1.0 + 1.0 / (1.0 + t26))));
+    }
+}
+
 /* Invert the matrices of all lanes in place by elimination without pivoting: they are I + O(h). Infinite where a pivot is
    far from 1. */
 static void volterra5_invert(volterra5_lanes matrix[restrict 25])
@@ -827,6 +885,23 @@ static double volterra5_largest(const volterra5_lanes size)
     return isfinite(total) ? largest : HUGE_VAL;
 }
 
+/* What is left after a correction of this size: quadratic in it, where the matrices are of the points corrected; where
+   they are of points further off, by bend, also of the order of size times bend. bound is what the last pass left. */
+static double volterra5_remaining(double size, double bend, double bound)
+{
+    const double growth = size / bound, left = size * (size + bend);
+    return growth > 1.0 ? growth * left : left;
+}
+
+/* The table of a stage, with its matrices or with those of the last pass. */
+static void volterra5_update(volterra5_lanes coef[restrict], volterra5_lines *line, int matrices)
+{
+    if (matrices)
+        volterra5_tabulate(coef, line);
+    else
+        volterra5_evaluate_lanes(coef, line->y, line->displacement, line->increment);
+}
+
 /* The steps of a block one after the other, each along the lines of its lane. As X, the state with its carry, gains
    increment - gain residual, the next residual follows from this one; X itself is added up apart. */
 static void volterra5_chain(volterra5_lines line[1], double x[5], double carry[5])
@@ -889,8 +964,9 @@ static void volterra5_foresee(const volterra5_memory *memory, volterra5_lanes we
     }
 }
 
-/* Guesses where no recurrence is known: midpoints of steps by the classical Runge-Kutta method. */
-static void volterra5_march(const volterra5_solver *s, volterra5_lines line[1])
+/* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
+   method, to leading order. */
+static void volterra5_march(const volterra5_solver *s, volterra5_table *table, volterra5_lines line[1])
 {
     static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
     double x[5], point[5], slope[5], mean[5];
@@ -911,6 +987,15 @@ static void volterra5_march(const volterra5_solver *s, volterra5_lines line[1])
             x[i] += h * mean[i];
         }
     }
+    for (int stage = 0; stage < 1; ++stage) {
+        volterra5_lines *at = &line[stage];
+        volterra5_evaluate_lanes(table->coef[stage], at->y, at->displacement, at->increment);
+        for (int i = 0; i < 5; ++i) {
+            volterra5_EACH_LANE
+            for (int lane = 0; lane < volterra5_LANES; ++lane)
+                at->y[i][lane] -= at->displacement[i][lane] + 0.5 * at->increment[i][lane];
+        }
+    }
 }
 
 /* volterra5_LANES steps at once: guess the points of all, and correct them together until the error that remains is as
@@ -919,14 +1004,15 @@ static int volterra5_block(volterra5_solver *s, volterra5_table *table, int most
 {
     volterra5_lines line[1];
     volterra5_lanes sizes;
-    double x[5], carry[5], value[5], previous = HUGE_VAL;
+    double x[5], carry[5], value[5], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
-    if (!s->foreseeing) volterra5_march(s, line);
+    if (!s->foreseeing) volterra5_march(s, table, line);
     for (int stage = 0; stage < 1 && s->foreseeing; ++stage)
         volterra5_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
     while (!solved) {
         double size = 0.0;
-        for (int stage = 0; stage < 1; ++stage) volterra5_tabulate(table->coef[stage], &line[stage]);
+        const int matrices = previous > 1e-05;
+        for (int stage = 0; stage < 1; ++stage) volterra5_update(table->coef[stage], &line[stage], matrices);
         memcpy(x, s->x, sizeof x);
         memcpy(carry, s->carry, sizeof carry);
         volterra5_chain(line, x, carry);
@@ -935,9 +1021,10 @@ static int volterra5_block(volterra5_solver *s, volterra5_table *table, int most
             size = fmax(size, volterra5_largest(sizes));
         }
         s->evaluations += 1 * volterra5_LANES;
-        const double growth = size / (previous * previous);
+        bend = matrices ? 0.0 : bend + previous;
+        bound = volterra5_remaining(size, bend, bound);
         /* The second test: after the square of so small a correction there is rounding only. */
-        solved = size * size * (growth > 1.0 ? growth : 1.0) <= 1e-20 || (previous < 1e-8 && size < 1e-10);
+        solved = bound <= 1e-20 || (previous < 1e-8 && size < 1e-10);
         if ((++passes >= most || !(size < previous)) && !solved) return 0;
         previous = size;
     }
@@ -967,26 +1054,28 @@ static void volterra5_choose_guess(volterra5_solver *s, size_t steps)
             s->foreseeing = 0;
             return;
         }
-    if (s->foreseeing || (steps < 4000 && s->steps < 4000) || s->steps < s->retry) return;
+    if (s->foreseeing || (steps < 4000 && s->steps < 1000) || s->steps < s->retry) return;
     for (int stage = 0; stage < 1; ++stage) volterra5_fit(&s->memory[stage]);
     s->foreseeing = 1;
     s->pause = volterra5_LANES;
 }
 
-/* Learn from a block: recurrences that guess no better than steps by Runge-Kutta are given up for a while, and so are
-   blocks that fail with those. */
+/* Learn from a block: after one that failed single steps are made, the more the more often that happens. Recurrences
+   that fail repeatedly, or need more passes than steps by Runge-Kutta did, are given up for a while. */
 static void volterra5_learn_from(volterra5_solver *s, int passes)
 {
-    if (s->foreseeing && (passes == 0 || (passes > 1 && passes >= s->passes))) {
-        s->foreseeing = 0;
-        s->doubt = 2 * s->doubt + 4000;
-        s->retry = s->steps + s->doubt;
-    } else if (passes == 0) {
+    if (passes > 0) {
+        s->setback /= 2;
+    } else {
         s->setback = 2 * s->setback + volterra5_LANES > 1000 ? 1000 : 2 * s->setback + volterra5_LANES;
         s->pause = s->setback;
-    } else {
-        s->setback /= 2;
-        if (!s->foreseeing) s->passes = passes;
+    }
+    if (!s->foreseeing) {
+        s->passes = passes > 0 ? passes : INT_MAX;
+    } else if (passes > s->passes || s->setback > 5 * volterra5_LANES) {
+        s->foreseeing = s->setback = s->pause = 0;
+        s->doubt = 2 * s->doubt + 4000;
+        s->retry = s->steps + s->doubt;
     }
 }
 
@@ -1135,14 +1224,15 @@ static void volterra5_group_fit(volterra5_group *group)
     group->patience = group->patience < 10000 ? 2 * group->patience + 1000 : 20000;
 }
 
-/* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group. */
-static int volterra5_group_open(volterra5_group *group, const volterra5_lanes size, const volterra5_lanes previous)
+/* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group.
+   bound is what remains in each lane. */
+static int volterra5_group_open(volterra5_group *group, const volterra5_lanes size, const volterra5_lanes previous,
+    double bend, volterra5_lanes bound)
 {
     int open = 0;
     for (int lane = 0; lane < volterra5_LANES; ++lane) {
-        const double growth = size[lane] / (previous[lane] * previous[lane]);
-        const double remaining = size[lane] * size[lane] * (growth > 1.0 ? growth : 1.0);
-        const int solved = remaining <= 1e-20 || (previous[lane] < 1e-8 && size[lane] < 1e-10);
+        bound[lane] = volterra5_remaining(size[lane], bend, bound[lane]);
+        const int solved = bound[lane] <= 1e-20 || (previous[lane] < 1e-8 && size[lane] < 1e-10);
         if (!isfinite(size[lane])) group->active[lane] = 0;
         open += group->active[lane] && !solved;
     }
@@ -1153,14 +1243,16 @@ static int volterra5_group_open(volterra5_group *group, const volterra5_lanes si
    allowed, lanes that are not solved leave the group. */
 static int volterra5_group_solve(volterra5_group *group, int stage, volterra5_lines *line)
 {
-    volterra5_lanes size, previous;
+    volterra5_lanes size, previous, bound;
+    double largest = HUGE_VAL, bend = 0.0;
     int iterations = 0, open = 1;
-    for (int lane = 0; lane < volterra5_LANES; ++lane) size[lane] = HUGE_VAL;
+    for (int lane = 0; lane < volterra5_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
     if (group->fitting[stage]) volterra5_group_foresee(group, stage, line->y);
     else volterra5_group_extrapolate(group, stage, line->y);
     for (; open > 0 && iterations < 20; ++iterations) {
         memcpy(previous, size, sizeof size);
-        volterra5_tabulate(group->coef[stage], line);
+        volterra5_update(group->coef[stage], line, largest > 1e-05);
+        bend = largest > 1e-05 ? 0.0 : bend + largest;
         for (int i = 0; i < 5; ++i) {
             volterra5_EACH_LANE
             for (int lane = 0; lane < volterra5_LANES; ++lane)
@@ -1168,10 +1260,11 @@ static int volterra5_group_solve(volterra5_group *group, int stage, volterra5_li
                     ((line->y[i][lane] - group->x[i][lane]) + line->displacement[i][lane]) - group->carry[i][lane];
         }
         volterra5_correct(line, size);
-        open = volterra5_group_open(group, size, previous);
+        open = volterra5_group_open(group, size, previous, bend, bound);
+        largest = volterra5_largest(size);
     }
     for (int lane = 0; lane < volterra5_LANES && open > 0; ++lane)
-        group->active[lane] = group->active[lane] && size[lane] * size[lane] <= 1e-20;
+        group->active[lane] = group->active[lane] && bound[lane] <= 1e-20;
     return iterations;
 }
 

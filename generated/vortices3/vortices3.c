@@ -13,11 +13,12 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: de021f6ef129c5b30126095bd5423dbc10bfcc5cd448095e44cd0fea29d4d2a3
+ * body-sha256: 8f065931d9c78963ccdf9cdc87819a4c007f67475cbe7d76e0efb18db3dcddae
  */
 #include "vortices3.h"
 
 #include <float.h>
+#include <limits.h>
 #include <math.h>
 #include <stdint.h>
 #include <string.h>
@@ -984,6 +985,7 @@ static vortices3_status vortices3_set_step(vortices3_solver *s, double h)
     s->setback = s->foreseeing = 0;
     s->doubt = s->retry = 0;
     s->effort = 0.0;
+    s->passes = INT_MAX;
     s->h = h;
     s->ready = 1;
     return vortices3_OK;
@@ -1730,6 +1732,122 @@ static void vortices3_linearise_lanes(vortices3_lanes coef[restrict 3], vortices
     vortices3_linearise_lanes_part4(coef, y, displacement, increment, jacobian, increment_jacobian, work);
 }
 
+/* vortices3_evaluate in all lanes. */
+static void vortices3_evaluate_lanes(vortices3_lanes coef[restrict 3], vortices3_lanes y[restrict 6],
+                                     vortices3_lanes displacement[restrict 6],
+                                     vortices3_lanes increment[restrict 6])
+{
+    vortices3_EACH_LANE
+    for (int lane = 0; lane < vortices3_LANES; ++lane) {
+        const double x1 = y[0][lane];
+        const double y1_ = y[1][lane];
+        const double x2 = y[2][lane];
+        const double y2 = y[3][lane];
+        const double x3 = y[4][lane];
+        const double y3 = y[5][lane];
+        const double t1 = x1 - x3;
+        const double t2 = y1_ - y3;
+        const double t3 = 1.0 / (t1 * t1 + t2 * t2);
+        const double t4 = coef[0][lane] * t3;
+        const double t5 = 0.25 * (t1 * t4);
+        const double t6 = x1 - x2;
+        const double t7 = y1_ - y2;
+        const double t8 = 1.0 / (t7 * t7 + t6 * t6);
+        const double t9 = coef[0][lane] * t8;
+        const double t10 = t6 * t9;
+        const double t11 = 0.5 * (t5 - t10);
+        const double t12 = x2 - x3;
+        const double t13 = y2 - y3;
+        const double t14 = 1.0 / (t13 * t13 + t12 * t12);
+        const double t15 = coef[0][lane] * t14;
+        const double t16 = 0.5 * (t12 * t15);
+        const double t17 = 0.25 * (t10 + t16);
+        const double t18 = t11 - t17;
+        const double t19 = t7 * t9;
+        const double t20 = 0.5 * (t13 * t15);
+        const double t21 = t19 + t20;
+        const double t22 = t2 * t4;
+        const double t23 = 0.25 * t22 - t19;
+        const double t24 = 0.25 * t21 - 0.5 * t23;
+        const double t25 = 2.0 * (t7 * t18) + 2.0 * (t6 * t24);
+        const double t26 = t8 * t25;
+        const double t27 = coef[1][lane] * t25;
+        const double t28 = t8 * t27;
+        const double t29 = 1.0 / 12.0 * (coef[1][lane] * (t8 * t26)) + 1.0 / 12.0 * (t8 * t28);
+        const double t30 = 2.0 * (t6 * t29);
+        const double t31 = coef[1][lane] * t8;
+        const double t32 = 1.0 / 3.0 * (t31 * t24);
+        const double t33 = coef[1][lane] * t14;
+        const double t34 = (-0.25) * t22 - t20;
+        const double t35 = (-0.25) * t21 - t34;
+        const double t36 = t5 + t16;
+        const double t37 = t17 - t36;
+        const double t38 = 2.0 * (t13 * t37) + 2.0 * (t12 * t35);
+        const double t39 = t14 * t38;
+        const double t40 = coef[1][lane] * t38;
+        const double t41 = t14 * t40;
+        const double t42 = (-1.0 / 24.0) * (coef[1][lane] * (t14 * t39)) - 1.0 / 24.0 * (t14 * t41);
+        const double t43 = 1.0 / 6.0 * (t33 * t35) + 2.0 * (t12 * t42);
+        const double t44 = 0.25 * (t30 - t32) - 0.25 * t43;
+        const double t45 = coef[1][lane] * t3;
+        const double t46 = (-0.5) * t23 - t34;
+        const double t47 = t11 - t36;
+        const double t48 = 2.0 * (t2 * t47) + 2.0 * (t1 * t46);
+        const double t49 = t3 * t48;
+        const double t50 = coef[1][lane] * t48;
+        const double t51 = t3 * t50;
+        const double t52 = (-1.0 / 48.0) * (coef[1][lane] * (t3 * t49)) - 1.0 / 48.0 * (t3 * t51);
+        const double t53 = 1.0 / 12.0 * (t45 * t46) + 2.0 * (t1 * t52);
+        const double t54 = 0.5 * t53;
+        const double t55 = 0.5 * (t32 - t30);
+        const double t56 = t44 + (t54 - t55);
+        const double t57 = 1.0 / 3.0 * (t31 * t18);
+        const double t58 = 2.0 * (t7 * t29);
+        const double t59 = 1.0 / 6.0 * (t33 * t37) + 2.0 * (t13 * t42);
+        const double t60 = 0.25 * (t57 - t58 + t59);
+        const double t61 = 1.0 / 12.0 * (t45 * t47) + 2.0 * (t2 * t52);
+        const double t62 = 0.5 * (t58 - t57 + t61);
+        const double t63 = t60 - t62;
+        const double t64 = 1.0 / 12.0 * (t26 * t27) + 1.0 / 12.0 * (t25 * t28) + (coef[0][lane] * (t6 * t63 + t7 * t56) - 1.0 / 6.0 * (coef[1][lane] * (t18 * t18 + t24 * t24)));
+        const double t65 = (-0.5) * (coef[2][lane] * t8) - t8 * t8 * t64;
+        const double t66 = 2.0 * (t18 * t29) + t9 * t56 + 2.0 * (t7 * t65);
+        const double t67 = t53 + t43;
+        const double t68 = 0.25 * t67 + 0.25 * (t55 - t54);
+        const double t69 = t61 + t59;
+        const double t70 = t62 - t69;
+        const double t71 = (-1.0 / 48.0) * (t49 * t50) - 1.0 / 48.0 * (t48 * t51) + (1.0 / 24.0 * (coef[1][lane] * (t46 * t46 + t47 * t47)) + coef[0][lane] * (t2 * t68 + 0.25 * (t1 * t70)));
+        const double t72 = 0.125 * (coef[2][lane] * t3) - t3 * t3 * t71;
+        const double t73 = 2.0 * (t47 * t52) + t4 * t68 + 2.0 * (t2 * t72);
+        const double p_y1 = t66 + t73;
+        const double t74 = 2.0 * (t24 * t29) + t9 * t63 + 2.0 * (t6 * t65);
+        const double t75 = 2.0 * (t46 * t52) + 0.25 * (t4 * t70) + 2.0 * (t1 * t72);
+        const double p_x1 = t74 + t75;
+        const double t76 = t67 + t44;
+        const double t77 = t60 - t69;
+        const double t78 = (-1.0 / 24.0) * (t39 * t40) - 1.0 / 24.0 * (t38 * t41) + (1.0 / 12.0 * (coef[1][lane] * (t35 * t35 + t37 * t37)) + coef[0][lane] * (0.5 * (t13 * t76) + 0.5 * (t12 * t77)));
+        const double t79 = 0.25 * (coef[2][lane] * t14) - t14 * t14 * t78;
+        const double t80 = 2.0 * (t37 * t42) + 0.5 * (t15 * t76) + 2.0 * (t13 * t79);
+        const double p_y2 = t80 - t66;
+        const double t81 = 2.0 * (t35 * t42) + 0.5 * (t15 * t77) + 2.0 * (t12 * t79);
+        const double p_x2 = t81 - t74;
+        const double t82 = t73 + t80;
+        const double p_y3 = -t82;
+        const double t83 = t81 + t75;
+        displacement[0][lane] = (-0.5) * p_y1;
+        displacement[1][lane] = 0.5 * p_x1;
+        displacement[2][lane] = (-0.25) * p_y2;
+        displacement[3][lane] = 0.25 * p_x2;
+        displacement[4][lane] = p_y3;
+        displacement[5][lane] = t83;
+        increment[0][lane] = p_y1;
+        increment[1][lane] = -p_x1;
+        increment[2][lane] = 0.5 * p_y2;
+        increment[3][lane] = (-0.5) * p_x2;
+        increment[4][lane] = 2.0 * t82;
+        increment[5][lane] = (-2.0) * t83;
+    }
+}
+
 /* Invert the matrices of all lanes in place by elimination without pivoting: they are I + O(h). Infinite where a pivot is
    far from 1. */
 static void vortices3_invert(vortices3_lanes matrix[restrict 36])
@@ -1819,6 +1937,23 @@ static double vortices3_largest(const vortices3_lanes size)
     return isfinite(total) ? largest : HUGE_VAL;
 }
 
+/* What is left after a correction of this size: quadratic in it, where the matrices are of the points corrected; where
+   they are of points further off, by bend, also of the order of size times bend. bound is what the last pass left. */
+static double vortices3_remaining(double size, double bend, double bound)
+{
+    const double growth = size / bound, left = size * (size + bend);
+    return growth > 1.0 ? growth * left : left;
+}
+
+/* The table of a stage, with its matrices or with those of the last pass. */
+static void vortices3_update(vortices3_lanes coef[restrict], vortices3_lines *line, int matrices)
+{
+    if (matrices)
+        vortices3_tabulate(coef, line);
+    else
+        vortices3_evaluate_lanes(coef, line->y, line->displacement, line->increment);
+}
+
 /* The steps of a block one after the other, each along the lines of its lane. As X, the state with its carry, gains
    increment - gain residual, the next residual follows from this one; X itself is added up apart. */
 static void vortices3_chain(vortices3_lines line[1], double x[6], double carry[6])
@@ -1881,8 +2016,9 @@ static void vortices3_foresee(const vortices3_memory *memory, vortices3_lanes we
     }
 }
 
-/* Guesses where no recurrence is known: midpoints of steps by the classical Runge-Kutta method. */
-static void vortices3_march(const vortices3_solver *s, vortices3_lines line[1])
+/* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
+   method, to leading order. */
+static void vortices3_march(const vortices3_solver *s, vortices3_table *table, vortices3_lines line[1])
 {
     static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
     double x[6], point[6], slope[6], mean[6];
@@ -1903,6 +2039,15 @@ static void vortices3_march(const vortices3_solver *s, vortices3_lines line[1])
             x[i] += h * mean[i];
         }
     }
+    for (int stage = 0; stage < 1; ++stage) {
+        vortices3_lines *at = &line[stage];
+        vortices3_evaluate_lanes(table->coef[stage], at->y, at->displacement, at->increment);
+        for (int i = 0; i < 6; ++i) {
+            vortices3_EACH_LANE
+            for (int lane = 0; lane < vortices3_LANES; ++lane)
+                at->y[i][lane] -= at->displacement[i][lane] + 0.5 * at->increment[i][lane];
+        }
+    }
 }
 
 /* vortices3_LANES steps at once: guess the points of all, and correct them together until the error that remains is as
@@ -1911,14 +2056,15 @@ static int vortices3_block(vortices3_solver *s, vortices3_table *table, int most
 {
     vortices3_lines line[1];
     vortices3_lanes sizes;
-    double x[6], carry[6], value[6], previous = HUGE_VAL;
+    double x[6], carry[6], value[6], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
-    if (!s->foreseeing) vortices3_march(s, line);
+    if (!s->foreseeing) vortices3_march(s, table, line);
     for (int stage = 0; stage < 1 && s->foreseeing; ++stage)
         vortices3_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
     while (!solved) {
         double size = 0.0;
-        for (int stage = 0; stage < 1; ++stage) vortices3_tabulate(table->coef[stage], &line[stage]);
+        const int matrices = previous > 1e-05;
+        for (int stage = 0; stage < 1; ++stage) vortices3_update(table->coef[stage], &line[stage], matrices);
         memcpy(x, s->x, sizeof x);
         memcpy(carry, s->carry, sizeof carry);
         vortices3_chain(line, x, carry);
@@ -1927,9 +2073,10 @@ static int vortices3_block(vortices3_solver *s, vortices3_table *table, int most
             size = fmax(size, vortices3_largest(sizes));
         }
         s->evaluations += 1 * vortices3_LANES;
-        const double growth = size / (previous * previous);
+        bend = matrices ? 0.0 : bend + previous;
+        bound = vortices3_remaining(size, bend, bound);
         /* The second test: after the square of so small a correction there is rounding only. */
-        solved = size * size * (growth > 1.0 ? growth : 1.0) <= 1e-20 || (previous < 1e-8 && size < 1e-10);
+        solved = bound <= 1e-20 || (previous < 1e-8 && size < 1e-10);
         if ((++passes >= most || !(size < previous)) && !solved) return 0;
         previous = size;
     }
@@ -1959,26 +2106,28 @@ static void vortices3_choose_guess(vortices3_solver *s, size_t steps)
             s->foreseeing = 0;
             return;
         }
-    if (s->foreseeing || (steps < 4000 && s->steps < 4000) || s->steps < s->retry) return;
+    if (s->foreseeing || (steps < 4000 && s->steps < 1000) || s->steps < s->retry) return;
     for (int stage = 0; stage < 1; ++stage) vortices3_fit(&s->memory[stage]);
     s->foreseeing = 1;
     s->pause = vortices3_LANES;
 }
 
-/* Learn from a block: recurrences that guess no better than steps by Runge-Kutta are given up for a while, and so are
-   blocks that fail with those. */
+/* Learn from a block: after one that failed single steps are made, the more the more often that happens. Recurrences
+   that fail repeatedly, or need more passes than steps by Runge-Kutta did, are given up for a while. */
 static void vortices3_learn_from(vortices3_solver *s, int passes)
 {
-    if (s->foreseeing && (passes == 0 || (passes > 1 && passes >= s->passes))) {
-        s->foreseeing = 0;
-        s->doubt = 2 * s->doubt + 4000;
-        s->retry = s->steps + s->doubt;
-    } else if (passes == 0) {
+    if (passes > 0) {
+        s->setback /= 2;
+    } else {
         s->setback = 2 * s->setback + vortices3_LANES > 1000 ? 1000 : 2 * s->setback + vortices3_LANES;
         s->pause = s->setback;
-    } else {
-        s->setback /= 2;
-        if (!s->foreseeing) s->passes = passes;
+    }
+    if (!s->foreseeing) {
+        s->passes = passes > 0 ? passes : INT_MAX;
+    } else if (passes > s->passes || s->setback > 5 * vortices3_LANES) {
+        s->foreseeing = s->setback = s->pause = 0;
+        s->doubt = 2 * s->doubt + 4000;
+        s->retry = s->steps + s->doubt;
     }
 }
 
@@ -2127,14 +2276,15 @@ static void vortices3_group_fit(vortices3_group *group)
     group->patience = group->patience < 10000 ? 2 * group->patience + 1000 : 20000;
 }
 
-/* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group. */
-static int vortices3_group_open(vortices3_group *group, const vortices3_lanes size, const vortices3_lanes previous)
+/* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group.
+   bound is what remains in each lane. */
+static int vortices3_group_open(vortices3_group *group, const vortices3_lanes size, const vortices3_lanes previous,
+    double bend, vortices3_lanes bound)
 {
     int open = 0;
     for (int lane = 0; lane < vortices3_LANES; ++lane) {
-        const double growth = size[lane] / (previous[lane] * previous[lane]);
-        const double remaining = size[lane] * size[lane] * (growth > 1.0 ? growth : 1.0);
-        const int solved = remaining <= 1e-20 || (previous[lane] < 1e-8 && size[lane] < 1e-10);
+        bound[lane] = vortices3_remaining(size[lane], bend, bound[lane]);
+        const int solved = bound[lane] <= 1e-20 || (previous[lane] < 1e-8 && size[lane] < 1e-10);
         if (!isfinite(size[lane])) group->active[lane] = 0;
         open += group->active[lane] && !solved;
     }
@@ -2145,14 +2295,16 @@ static int vortices3_group_open(vortices3_group *group, const vortices3_lanes si
    allowed, lanes that are not solved leave the group. */
 static int vortices3_group_solve(vortices3_group *group, int stage, vortices3_lines *line)
 {
-    vortices3_lanes size, previous;
+    vortices3_lanes size, previous, bound;
+    double largest = HUGE_VAL, bend = 0.0;
     int iterations = 0, open = 1;
-    for (int lane = 0; lane < vortices3_LANES; ++lane) size[lane] = HUGE_VAL;
+    for (int lane = 0; lane < vortices3_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
     if (group->fitting[stage]) vortices3_group_foresee(group, stage, line->y);
     else vortices3_group_extrapolate(group, stage, line->y);
     for (; open > 0 && iterations < 20; ++iterations) {
         memcpy(previous, size, sizeof size);
-        vortices3_tabulate(group->coef[stage], line);
+        vortices3_update(group->coef[stage], line, largest > 1e-05);
+        bend = largest > 1e-05 ? 0.0 : bend + largest;
         for (int i = 0; i < 6; ++i) {
             vortices3_EACH_LANE
             for (int lane = 0; lane < vortices3_LANES; ++lane)
@@ -2160,10 +2312,11 @@ static int vortices3_group_solve(vortices3_group *group, int stage, vortices3_li
                     ((line->y[i][lane] - group->x[i][lane]) + line->displacement[i][lane]) - group->carry[i][lane];
         }
         vortices3_correct(line, size);
-        open = vortices3_group_open(group, size, previous);
+        open = vortices3_group_open(group, size, previous, bend, bound);
+        largest = vortices3_largest(size);
     }
     for (int lane = 0; lane < vortices3_LANES && open > 0; ++lane)
-        group->active[lane] = group->active[lane] && size[lane] * size[lane] <= 1e-20;
+        group->active[lane] = group->active[lane] && bound[lane] <= 1e-20;
     return iterations;
 }
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 
-from phigen.scheme.program import Program
+from phigen.scheme.program import Kernel, Program
 from phigen.symbolic.expression import topological
 from phigen.symbolic.special import LANE_REACH, SPECIAL, lane_coefficients, order_of
 from phigen.targets.c.kernels import FUNCTIONS, LANE_FUNCTIONS, LANES, each_lane, function
@@ -17,6 +18,9 @@ MOST_STACK = 256 * 1024
 #: Passes over a block that cost, per step, what an evaluation at one point costs: with loops that are vectorised, and
 #: with loops that are not as they call functions of the library.
 PASSES, PASSES_OF_CALLS = 2, 1
+
+#: Corrections below which the next pass goes on with the matrices of the last, as its error is then of third order.
+FROZEN = 1e-5
 
 #: Functions that are instructions, or arithmetic.
 _INLINE = {"abs", "sqrt", "sign", "inv"}
@@ -36,6 +40,7 @@ _RESET = [
     "s->setback = s->foreseeing = 0;",
     "s->doubt = s->retry = 0;",
     "s->effort = 0.0;",
+    "s->passes = INT_MAX;",
 ]
 
 #: Terms of the series of exp(r) − 1 for |r| ≤ ½ log 2, and the largest argument of exp in a lane.
@@ -63,6 +68,7 @@ def values(program: Program) -> Mapping[str, object]:
         "lanes": LANES,
         "each_lane": each_lane(program),
         "floor": "0.0" if program.relative else "1e-6",
+        "frozen": repr(FROZEN),
         "passes": PASSES if vectorised(program) else PASSES_OF_CALLS,
         "ensemble_how": f"{LANES} are integrated\n   side by side, and with OpenMP such groups in parallel."
         if blocks(program)
@@ -95,14 +101,33 @@ def pieces(program: Program, values: Mapping[str, object]) -> list[str]:
     found += [render("c", "phi_lane.c", _phi(program, f)) for f in SPECIAL if f in ops]
     found += [render("c", "expm1_lane.c", _exponential(program, f)) for f in ("exp", "expm1") if f in ops]
     found.append(function(program, kernel, lanes=True) + "\n")
+    found.append(function(program, _without_matrices(kernel), lanes=True) + "\n")
     if "invert" in program.kernels:
         found.append(function(program, program.kernels["invert"], lanes=True) + "\n")
         found.append(render("c", "tabulate_unrolled.c", values))
     else:
         found.append(render("c", "tabulate.c", values))
-    templates = ["sizes", "correct", "chain", "block", "march", "block_step", "choose_guess", "integrate_blocks"]
+    templates = [
+        "sizes",
+        "correct",
+        "solved",
+        "chain",
+        "block",
+        "march",
+        "block_step",
+        "choose_guess",
+        "integrate_blocks",
+    ]
     templates += ["group", "group_guess", "group_solve", "group_step", "group_run", "ensemble"]
     return found + [render("c", f"{template}.c", values) for template in templates]
+
+
+def _without_matrices(kernel: Kernel) -> Kernel:
+    """What a pass needs that goes on with the matrices of the last."""
+    outputs = tuple(o for o in kernel.outputs if "jacobian" not in o.name)
+    needed = set(topological([v for o in outputs for v in o.values]))
+    named = tuple((name, value) for name, value in kernel.named if value in needed)
+    return replace(kernel, name="evaluate", outputs=outputs, named=named)
 
 
 def _phi(program: Program, name: str) -> Mapping[str, object]:
