@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 39e584cd7e6c45de416e208b4eed0318ce8309d2c170cf666b7eef6cbfc1f6ba
+ * body-sha256: b07dc61d3681e0db69b1903ab7a095a9d89ab4ff73972bdcfd43df8cf1572660
  */
 #include "pendulum.h"
 
@@ -431,6 +431,58 @@ typedef struct {
     pendulum_lanes inverse[4], slope[4], gain[4];
 } pendulum_lines;
 
+/* sin u for the loops over lanes: u = k pi + r with |r| <= pi/2, no branches. Infinite beyond |u| = 1000000.0. */
+static inline double pendulum_sin_lane(double u)
+{
+    const double shifted = (u * 0.3183098861837907 + 0.0) + 6755399441055744.0;
+    const double k = (shifted - 6755399441055744.0) - 0.0;
+    const double r = ((u - k * 3.141592651605606) - k * 1.9841871479187034e-09) - k * 1.1442377452219664e-17, q = r * r;
+    uint64_t parity, bits; /* the last bit of shifted is the parity of k + 0.0 */
+    double value, sum = -3.868170170630684e-23;
+    sum = sum * q + 1.9572941063391263e-20;
+    sum = sum * q + -8.22063524662433e-18;
+    sum = sum * q + 2.8114572543455206e-15;
+    sum = sum * q + -7.647163731819816e-13;
+    sum = sum * q + 1.6059043836821613e-10;
+    sum = sum * q + -2.505210838544172e-08;
+    sum = sum * q + 2.7557319223985893e-06;
+    sum = sum * q + -0.0001984126984126984;
+    sum = sum * q + 0.008333333333333333;
+    sum = sum * q + -0.16666666666666666;
+    value = r + r * q * sum;
+    memcpy(&parity, &shifted, sizeof parity);
+    memcpy(&bits, &value, sizeof bits);
+    bits ^= parity << 63;
+    memcpy(&value, &bits, sizeof bits);
+    return value + (fabs(u) <= 1000000.0 ? 0.0 : HUGE_VAL);
+}
+
+/* cos u for the loops over lanes: u = k pi + r with |r| <= pi/2, no branches. Infinite beyond |u| = 1000000.0. */
+static inline double pendulum_cos_lane(double u)
+{
+    const double shifted = (u * 0.3183098861837907 + 0.5) + 6755399441055744.0;
+    const double k = (shifted - 6755399441055744.0) - 0.5;
+    const double r = ((u - k * 3.141592651605606) - k * 1.9841871479187034e-09) - k * 1.1442377452219664e-17, q = r * r;
+    uint64_t parity, bits; /* the last bit of shifted is the parity of k + 0.5 */
+    double value, sum = -3.868170170630684e-23;
+    sum = sum * q + 1.9572941063391263e-20;
+    sum = sum * q + -8.22063524662433e-18;
+    sum = sum * q + 2.8114572543455206e-15;
+    sum = sum * q + -7.647163731819816e-13;
+    sum = sum * q + 1.6059043836821613e-10;
+    sum = sum * q + -2.505210838544172e-08;
+    sum = sum * q + 2.7557319223985893e-06;
+    sum = sum * q + -0.0001984126984126984;
+    sum = sum * q + 0.008333333333333333;
+    sum = sum * q + -0.16666666666666666;
+    value = r + r * q * sum;
+    memcpy(&parity, &shifted, sizeof parity);
+    memcpy(&bits, &value, sizeof bits);
+    bits ^= parity << 63;
+    memcpy(&value, &bits, sizeof bits);
+    return value + (fabs(u) <= 1000000.0 ? 0.0 : HUGE_VAL);
+}
+
 /* pendulum_linearise in all lanes. */
 static void pendulum_linearise_lanes(pendulum_lanes coef[restrict 19], pendulum_lanes y[restrict 2],
                                      pendulum_lanes displacement[restrict 2],
@@ -441,10 +493,10 @@ static void pendulum_linearise_lanes(pendulum_lanes coef[restrict 19], pendulum_
     for (int lane = 0; lane < pendulum_LANES; ++lane) {
         const double q = y[0][lane];
         const double p = y[1][lane];
-        const double t1 = sin(q);
+        const double t1 = pendulum_sin_lane(q);
         const double t2 = t1 * t1;
         const double t3 = coef[7][lane] + coef[8][lane] * t2;
-        const double t4 = cos(q);
+        const double t4 = pendulum_cos_lane(q);
         const double t5 = p * p;
         const double t6 = coef[9][lane] + coef[10][lane] * t4;
         const double p_p = p * (t3 + t4 * (coef[11][lane] * t5 + t6));
@@ -479,9 +531,9 @@ static void pendulum_evaluate_lanes(pendulum_lanes coef[restrict 19], pendulum_l
     for (int lane = 0; lane < pendulum_LANES; ++lane) {
         const double q = y[0][lane];
         const double p = y[1][lane];
-        const double t1 = sin(q);
+        const double t1 = pendulum_sin_lane(q);
         const double t2 = t1 * t1;
-        const double t3 = cos(q);
+        const double t3 = pendulum_cos_lane(q);
         const double t4 = p * p;
         const double p_p = p * (coef[7][lane] + coef[8][lane] * t2 + t3 * (coef[11][lane] * t4 + (coef[9][lane] + coef[10][lane] * t3)));
         const double p_q = t1 * (t4 * (coef[6][lane] * t4 + (coef[5][lane] + coef[4][lane] * t3)) + (t3 * (coef[0][lane] + coef[3][lane] * t3) + (coef[1][lane] + coef[2][lane] * t2)));
@@ -777,7 +829,7 @@ static pendulum_status pendulum_single(pendulum_solver *s)
     return status;
 }
 
-/* Blocks of steps where they cost less than single steps, with at most as many passes over a block as 1 for each
+/* Blocks of steps where they cost less than single steps, with at most as many passes over a block as 2 for each
    evaluation in a single step. The results differ by round-off only. */
 pendulum_status pendulum_integrate(pendulum_solver *s, double h, size_t steps)
 {
@@ -788,7 +840,7 @@ pendulum_status pendulum_integrate(pendulum_solver *s, double h, size_t steps)
         if (steps >= pendulum_LANES && s->pause == 0) pendulum_choose_guess(s, steps);
         if (steps >= pendulum_LANES && s->pause == 0) {
             pendulum_tell(s, &table);
-            const int passes = pendulum_block(s, &table, (int)(1 * s->effort + 0.5));
+            const int passes = pendulum_block(s, &table, (int)(2 * s->effort + 0.5));
             pendulum_learn_from(s, passes);
             if (passes > 0) steps -= pendulum_LANES;
         } else {

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: b6a0d12fd5c6cbb15bc113b7d1256733f336edb1993d52f259569bc3568f970a
+ * body-sha256: a75dd875c88c29cab1da1c0b0d178f2d75e6f2f39b959854ab599b62f522900d
  */
 #include "poisson_not_hamiltonian.h"
 
@@ -562,6 +562,58 @@ static inline double poisson_not_hamiltonian_exp_lane(double u)
     return power * sum + power + (fabs(u) <= 700.0 ? 0.0 : HUGE_VAL);
 }
 
+/* sin u for the loops over lanes: u = k pi + r with |r| <= pi/2, no branches. Infinite beyond |u| = 1000000.0. */
+static inline double poisson_not_hamiltonian_sin_lane(double u)
+{
+    const double shifted = (u * 0.3183098861837907 + 0.0) + 6755399441055744.0;
+    const double k = (shifted - 6755399441055744.0) - 0.0;
+    const double r = ((u - k * 3.141592651605606) - k * 1.9841871479187034e-09) - k * 1.1442377452219664e-17, q = r * r;
+    uint64_t parity, bits; /* the last bit of shifted is the parity of k + 0.0 */
+    double value, sum = -3.868170170630684e-23;
+    sum = sum * q + 1.9572941063391263e-20;
+    sum = sum * q + -8.22063524662433e-18;
+    sum = sum * q + 2.8114572543455206e-15;
+    sum = sum * q + -7.647163731819816e-13;
+    sum = sum * q + 1.6059043836821613e-10;
+    sum = sum * q + -2.505210838544172e-08;
+    sum = sum * q + 2.7557319223985893e-06;
+    sum = sum * q + -0.0001984126984126984;
+    sum = sum * q + 0.008333333333333333;
+    sum = sum * q + -0.16666666666666666;
+    value = r + r * q * sum;
+    memcpy(&parity, &shifted, sizeof parity);
+    memcpy(&bits, &value, sizeof bits);
+    bits ^= parity << 63;
+    memcpy(&value, &bits, sizeof bits);
+    return value + (fabs(u) <= 1000000.0 ? 0.0 : HUGE_VAL);
+}
+
+/* cos u for the loops over lanes: u = k pi + r with |r| <= pi/2, no branches. Infinite beyond |u| = 1000000.0. */
+static inline double poisson_not_hamiltonian_cos_lane(double u)
+{
+    const double shifted = (u * 0.3183098861837907 + 0.5) + 6755399441055744.0;
+    const double k = (shifted - 6755399441055744.0) - 0.5;
+    const double r = ((u - k * 3.141592651605606) - k * 1.9841871479187034e-09) - k * 1.1442377452219664e-17, q = r * r;
+    uint64_t parity, bits; /* the last bit of shifted is the parity of k + 0.5 */
+    double value, sum = -3.868170170630684e-23;
+    sum = sum * q + 1.9572941063391263e-20;
+    sum = sum * q + -8.22063524662433e-18;
+    sum = sum * q + 2.8114572543455206e-15;
+    sum = sum * q + -7.647163731819816e-13;
+    sum = sum * q + 1.6059043836821613e-10;
+    sum = sum * q + -2.505210838544172e-08;
+    sum = sum * q + 2.7557319223985893e-06;
+    sum = sum * q + -0.0001984126984126984;
+    sum = sum * q + 0.008333333333333333;
+    sum = sum * q + -0.16666666666666666;
+    value = r + r * q * sum;
+    memcpy(&parity, &shifted, sizeof parity);
+    memcpy(&bits, &value, sizeof bits);
+    bits ^= parity << 63;
+    memcpy(&value, &bits, sizeof bits);
+    return value + (fabs(u) <= 1000000.0 ? 0.0 : HUGE_VAL);
+}
+
 /* poisson_not_hamiltonian_linearise in all lanes. */
 static void poisson_not_hamiltonian_linearise_lanes(poisson_not_hamiltonian_lanes coef[restrict 2],
                                                     poisson_not_hamiltonian_lanes y[restrict 3],
@@ -585,9 +637,9 @@ static void poisson_not_hamiltonian_linearise_lanes(poisson_not_hamiltonian_lane
         const double t5 = x * t4;
         const double t6 = poisson_not_hamiltonian_exp_lane(0.25 * (t3 - t5));
         const double t7 = 0.25 * (t1 * t4 + x * t2);
-        const double t8 = cos(t7);
+        const double t8 = poisson_not_hamiltonian_cos_lane(t7);
         const double t9 = x * t8;
-        const double t10 = sin(t7);
+        const double t10 = poisson_not_hamiltonian_sin_lane(t7);
         const double t11 = t1 * t10;
         const double t12 = t9 - t11;
         const double t13 = t6 * t12;
@@ -745,9 +797,9 @@ static void poisson_not_hamiltonian_evaluate_lanes(poisson_not_hamiltonian_lanes
         const double t5 = x * t4;
         const double t6 = poisson_not_hamiltonian_exp_lane(0.25 * (t3 - t5));
         const double t7 = 0.25 * (t1 * t4 + x * t2);
-        const double t8 = cos(t7);
+        const double t8 = poisson_not_hamiltonian_cos_lane(t7);
         const double t9 = x * t8;
-        const double t10 = sin(t7);
+        const double t10 = poisson_not_hamiltonian_sin_lane(t7);
         const double t11 = t1 * t10;
         const double t12 = t6 * (t9 - t11);
         const double t13 = 0.5 * (y_ + z - x);
@@ -1078,7 +1130,7 @@ static poisson_not_hamiltonian_status poisson_not_hamiltonian_single(poisson_not
     return status;
 }
 
-/* Blocks of steps where they cost less than single steps, with at most as many passes over a block as 1 for each
+/* Blocks of steps where they cost less than single steps, with at most as many passes over a block as 2 for each
    evaluation in a single step. The results differ by round-off only. */
 poisson_not_hamiltonian_status poisson_not_hamiltonian_integrate(poisson_not_hamiltonian_solver *s, double h, size_t steps)
 {
@@ -1089,7 +1141,7 @@ poisson_not_hamiltonian_status poisson_not_hamiltonian_integrate(poisson_not_ham
         if (steps >= poisson_not_hamiltonian_LANES && s->pause == 0) poisson_not_hamiltonian_choose_guess(s, steps);
         if (steps >= poisson_not_hamiltonian_LANES && s->pause == 0) {
             poisson_not_hamiltonian_tell(s, &table);
-            const int passes = poisson_not_hamiltonian_block(s, &table, (int)(1 * s->effort + 0.5));
+            const int passes = poisson_not_hamiltonian_block(s, &table, (int)(2 * s->effort + 0.5));
             poisson_not_hamiltonian_learn_from(s, passes);
             if (passes > 0) steps -= poisson_not_hamiltonian_LANES;
         } else {

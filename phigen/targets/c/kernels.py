@@ -32,8 +32,14 @@ LONGEST_FUNCTION = 200
 #: Points at which a kernel for lanes is evaluated at once: what one vector of AVX-512 holds.
 LANES = 8
 
-#: Functions with a version for the loops over lanes; a loop that calls any other is not vectorised.
-LANE_FUNCTIONS = ("exp", "expm1", *SPECIAL)
+#: Functions with a version of their own for the loops over lanes, and those that are formulas of these.
+LANE_FUNCTIONS = ("exp", "expm1", "log", "sin", "cos", *SPECIAL)
+LANE_FORMULAS = {
+    "versin": "(2.0 * {sin}(0.5 * ({{0}})) * {sin}(0.5 * ({{0}})))",
+    "sinh": "(0.5 * ({expm1}({{0}}) - {expm1}(-({{0}}))))",
+    "cosh": "(0.5 * ({exp}({{0}}) + {exp}(-({{0}}))))",
+    "tanh": "({expm1}(2.0 * ({{0}})) / ({expm1}(2.0 * ({{0}})) + 2.0))",
+}
 
 
 def function(
@@ -52,7 +58,8 @@ def function(
     pieces = parts(lower(kernel), LONGEST_FUNCTION)
     workspace = 1 + max((int(a.target[2:]) for p in pieces for a in p.assignments if a.target[:2] == "w:"), default=0)
     if lanes:
-        functions = {**functions, **{f: f"{program.name}_{f}_lane" for f in LANE_FUNCTIONS}}
+        own = {f: f"{program.name}_{f}_lane" for f in LANE_FUNCTIONS}
+        functions = {**functions, **own, **{f: text.format_map(own) for f, text in LANE_FORMULAS.items()}}
     form = Form(f"{program.name}_{kernel.name}{'_lanes' if lanes else ''}", exported, lanes, functions)
     if len(pieces) == 1:
         return _definition(program, kernel, form, pieces[0])

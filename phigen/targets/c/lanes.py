@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Set
 from dataclasses import replace
 
 from phigen.scheme.program import Kernel, Program
 from phigen.symbolic.expression import topological
 from phigen.symbolic.special import LANE_REACH, SPECIAL, lane_coefficients, order_of
-from phigen.targets.c.kernels import FUNCTIONS, LANE_FUNCTIONS, LANES, each_lane, function
+from phigen.targets.c.kernels import FUNCTIONS, LANE_FORMULAS, LANE_FUNCTIONS, LANES, each_lane, function
 from phigen.targets.rendering import render
 
 #: Bytes that the working arrays of a block may take on the stack.
@@ -46,6 +46,14 @@ _RESET = [
 #: Terms of the series of exp(r) − 1 for |r| ≤ ½ log 2, and the largest argument of exp in a lane.
 _EXP_TERMS, _EXP_REACH = 14, 700.0
 
+#: Terms of the series of artanh(f) − f for |f| ≤ tan²(π/8).
+_LOG_TERMS = 11
+
+#: Terms of the series of sin(r) − r for |r| ≤ π/2; π in parts of 28 bits, whose multiples are exact, and a rest (Cody
+#: and Waite, Software Manual for the Elementary Functions, 1980); the largest argument for which that holds.
+_SINE_TERMS, _SINE_REACH = 11, 1e6
+_PI = 3.141592651605606, 1.9841871479187034e-09, 1.1442377452219664e-17
+
 
 def blocks(program: Program) -> bool:
     """Whether `integrate` takes blocks of steps: not for paths, explicit steps, or what would need too much stack."""
@@ -58,7 +66,7 @@ def vectorised(program: Program) -> bool:
     """Whether compilers can make vector instructions of the lanes: not of calls to functions of the library."""
     if not blocks(program):
         return False
-    calls = set(FUNCTIONS) - set(LANE_FUNCTIONS) - _INLINE
+    calls = set(FUNCTIONS) - set(LANE_FUNCTIONS) - set(LANE_FORMULAS) - _INLINE
     return not calls & {e.op for e in topological(program.kernels["linearise"].roots)}
 
 
@@ -96,10 +104,7 @@ def pieces(program: Program, values: Mapping[str, object]) -> list[str]:
     if not blocks(program):
         return [render("c", "integrate.c", values), render("c", "ensemble_members.c", values)]
     kernel = program.kernels["linearise"]
-    ops = {e.op for e in topological(kernel.roots)}
-    found = [render("c", "lanes.c", values)]
-    found += [render("c", "phi_lane.c", _phi(program, f)) for f in SPECIAL if f in ops]
-    found += [render("c", "expm1_lane.c", _exponential(program, f)) for f in ("exp", "expm1") if f in ops]
+    found = [render("c", "lanes.c", values), *lane_functions(program, {e.op for e in topological(kernel.roots)})]
     found.append(function(program, kernel, lanes=True) + "\n")
     found.append(function(program, _without_matrices(kernel), lanes=True) + "\n")
     if "invert" in program.kernels:
@@ -120,6 +125,15 @@ def pieces(program: Program, values: Mapping[str, object]) -> list[str]:
     ]
     templates += ["group", "group_guess", "group_solve", "group_step", "group_run", "ensemble"]
     return found + [render("c", f"{template}.c", values) for template in templates]
+
+
+def lane_functions(program: Program, ops: Set[str]) -> list[str]:
+    """Versions for the loops over lanes of the functions that these operations call."""
+    needed = ops | {f for f in LANE_FUNCTIONS for op in ops & set(LANE_FORMULAS) if f"{{{f}}}" in LANE_FORMULAS[op]}
+    found = [render("c", "phi_lane.c", _phi(program, f)) for f in SPECIAL if f in needed]
+    found += [render("c", "expm1_lane.c", _exponential(program, f)) for f in ("exp", "expm1") if f in needed]
+    found += [render("c", "log_lane.c", _logarithm(program))] if "log" in needed else []
+    return found + [render("c", "sine_lane.c", _sine(program, f)) for f in ("sin", "cos") if f in needed]
 
 
 def _without_matrices(kernel: Kernel) -> Kernel:
@@ -147,6 +161,30 @@ def _exponential(program: Program, name: str) -> Mapping[str, object]:
         "meaning": {"exp": "exp(u)", "expm1": "exp(u) - 1"}[name],
         "rest": {"exp": "power", "expm1": "(power - 1.0)"}[name],
         "reach": repr(_EXP_REACH),
+        "last": repr(coefficients[-1]),
+        "others": [repr(c) for c in reversed(coefficients[:-1])],
+    }
+
+
+def _logarithm(program: Program) -> Mapping[str, object]:
+    coefficients = [1 / (2 * k + 1) for k in range(1, _LOG_TERMS + 1)]
+    return {
+        "name": f"{program.name}_log",
+        "last": repr(coefficients[-1]),
+        "others": [repr(c) for c in reversed(coefficients[:-1])],
+    }
+
+
+def _sine(program: Program, name: str) -> Mapping[str, object]:
+    coefficients = [(-1) ** k / math.factorial(2 * k + 1) for k in range(1, _SINE_TERMS + 1)]
+    return {
+        "name": f"{program.name}_{name}",
+        "meaning": f"{name} u",
+        "shift": {"sin": "0.0", "cos": "0.5"}[name],
+        "pi_1": repr(_PI[0]),
+        "pi_2": repr(_PI[1]),
+        "pi_3": repr(_PI[2]),
+        "reach": repr(_SINE_REACH),
         "last": repr(coefficients[-1]),
         "others": [repr(c) for c in reversed(coefficients[:-1])],
     }

@@ -1,0 +1,64 @@
+"""The functions for the loops over lanes agree with the library to a few units of the last place."""
+
+import pytest
+from support import compiled, run, tool, write
+
+from phigen.symbolic.special import SPECIAL
+from phigen.targets.c.kernels import LANE_FORMULAS, LANE_FUNCTIONS
+from phigen.targets.c.lanes import lane_functions
+
+#: Largest argument, and units of the last place; sums of exponentials lose one or two.
+RANGES = {"log": (1e308, 2), "exp": (600.0, 2), "expm1": (600.0, 3), "sin": (1e6, 2), "cos": (1e6, 2)}
+
+#: Where functions are compared, for −1 ≤ t ≤ 1.
+ARGUMENTS = {"log": "exp(700.0 * t), 1.0 + 0.5 * t * t * t", "others": "REACH * t, 3.0 * t * t * t"}
+
+MAIN = """
+#include <stdio.h>
+#define REACH {reach}
+int main(void)
+{{
+    double worst = 0.0;
+    for (int k = -200000; k <= 200000; ++k) {{
+        const double t = k / 200000.0, u[2] = {{ {arguments} }};
+        for (int i = 0; i < 2; ++i) {{
+            const double found = t_{name}_lane(u[i]), right = {name}(u[i]);
+            worst = fmax(worst, fabs(found - right) / (fabs(right) * DBL_EPSILON + 1e-300));
+        }}
+    }}
+    printf("%.2f", worst);
+    return isfinite(t_{name}_lane(2.0 * REACH)) || isfinite(t_{name}_lane(-2.0 * REACH));
+}}
+"""
+
+
+@pytest.mark.parametrize("flags", ["-O0", "-O3 -march=native -ffp-contract=fast"])
+@pytest.mark.parametrize("name", RANGES)
+def test_lane_functions_agree_with_the_library(name, flags, tmp_path):
+    """Over the whole range and, closer together, near 0; infinite beyond the range, so that blocks there fail."""
+    reach, units = RANGES[name]
+    program = compiled("pendulum").program
+    code = "\n".join(lane_functions(program, {name})).replace("pendulum_", "t_")
+    head = "#include <float.h>\n#include <math.h>\n#include <stdint.h>\n#include <string.h>\n"
+    write(
+        tmp_path,
+        {
+            "main.c": head
+            + code
+            + MAIN.format(name=name, reach=reach, arguments=ARGUMENTS["log" if name == "log" else "others"])
+        },
+    )
+    run([tool("gcc"), "-std=c99", *flags.split(), "main.c", "-o", "main", "-lm"], tmp_path)
+    assert float(run([tmp_path / "main"], tmp_path)) <= units
+
+
+def test_every_lane_function_is_tested_or_special():
+    assert set(LANE_FUNCTIONS) == {*RANGES, *SPECIAL}
+
+
+@pytest.mark.parametrize("op", LANE_FORMULAS)
+def test_what_formulas_call_is_emitted(op):
+    code = "".join(lane_functions(compiled("pendulum").program, {op}))
+    own = {f: f"pendulum_{f}_lane" for f in LANE_FUNCTIONS}
+    for name in own.values():
+        assert (f"{name}(" in LANE_FORMULAS[op].format_map(own)) == (f"double {name}(" in code)
