@@ -97,6 +97,11 @@ class Watch:
             "broken": np.zeros((), dtype=bool),
         }
 
+    @property
+    def begun(self) -> bool:
+        """Whether the initial state has been seen."""
+        return bool(self.state["good"])
+
     def see(self, t: Floats, x: Floats) -> None:
         """Take in the next rows, times (rows,) and states (rows, DIM); those after one not finite do not count."""
         state, good = self.state, int(self.state["good"])

@@ -215,7 +215,8 @@ def record(recorder: Recorder, console: Console) -> tuple[StepError | None, bool
     label = f"{recorder.solver.interface.name}, order {recorder.solver.order}"
     with interruptible() as stop, console.progress(label, run.steps) as progress:
         see_tangent = growth.see if growth else None
-        pieces = march(session, experiment.h, run.steps, run.stride, recorder.finder, see_tangent)
+        begun = recorder.watch.begun
+        pieces = march(session, experiment.h, run.steps, run.stride, recorder.finder, see_tangent, begun=begun)
         try:
             for piece in pieces:
                 recorder.see(piece)

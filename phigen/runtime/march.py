@@ -37,14 +37,17 @@ def march(
     stride: int,
     finder: CrossingFinder[Session] | None = None,
     see_tangent: Callable[[Floats], None] | None = None,
+    *,
+    begun: bool = False,
 ) -> Iterator[Piece]:
     """Go on with a session until ``steps`` steps of size h are made, storing every ``stride``-th state and the last.
 
     Pieces end somewhere; the rows do not depend on where. With ``see_tangent``, the derivative (DIM, DIM) of each step
-    is told. Raises `BackendError` after a piece that ends with the last good state.
+    is told; ``begun`` says that the initial state has been given before. Raises `BackendError` after a piece that ends
+    with the last good state.
     """
     size = 1
-    if session.steps == 0:
+    if not begun:
         yield Piece(np.zeros(1, dtype=np.int64), session.state()[np.newaxis], [])
     while session.steps < steps:
         start = time.perf_counter()

@@ -86,6 +86,16 @@ def test_an_interrupted_run_goes_on_to_the_same_bytes(phigen, in_tmp, name, targ
     assert sorted(p.name for p in in_tmp.iterdir()) == [f"a.{suffix}"]
 
 
+def test_a_run_interrupted_before_its_first_step_starts_once(phigen, in_tmp):
+    """The checkpoint of step 0 may have been written before the initial state was stored, or after."""
+    run = ("run", SPECS / "rigid_body.yaml", "-t", "numpy", "--steps", 9, "-o", "a.csv")
+    with interrupted(0, steps=7):
+        assert "interrupted after 0 of 9 steps" in phigen(*run).stderr
+    assert len(Path("a.csv").read_text().splitlines()) == 2
+    assert phigen(*run, "--resume").exit_code == 0
+    assert [row.split(",")[0] for row in Path("a.csv").read_text().splitlines()] == ["t", "0.0", "0.9"]
+
+
 def test_sections_and_exponents_go_on_as_well(phigen, in_tmp):
     run = ("run", *EVERYTHING, "--steps", 1500, "--section", "s.csv", "-o", "a.npz", "--plot", "f.svg", "--json")
     whole = phigen(*run)
