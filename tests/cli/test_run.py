@@ -93,7 +93,9 @@ def test_a_run_interrupted_before_its_first_step_starts_once(phigen, in_tmp):
         assert "interrupted after 0 of 9 steps" in phigen(*run).stderr
     assert len(Path("a.csv").read_text().splitlines()) == 2
     assert phigen(*run, "--resume").exit_code == 0
-    assert [row.split(",")[0] for row in Path("a.csv").read_text().splitlines()] == ["t", "0.0", "0.9"]
+    times = [row.split(",")[0] for row in Path("a.csv").read_text().splitlines()]
+    assert times[:3] == ["t", "0.0", "0.1"]
+    assert len(times) == 11
 
 
 def test_sections_and_exponents_go_on_as_well(phigen, in_tmp):
