@@ -95,7 +95,7 @@ def test_a_run_interrupted_before_its_first_step_starts_once(phigen, in_tmp):
     assert phigen(*run, "--resume").exit_code == 0
     times = [row.split(",")[0] for row in Path("a.csv").read_text().splitlines()]
     assert times[:3] == ["t", "0.0", "0.1"]
-    assert len(times) == 11
+    assert len(times) == len(set(times)) == 7  # every second state, and the last
 
 
 def test_sections_and_exponents_go_on_as_well(phigen, in_tmp):
