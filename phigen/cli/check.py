@@ -22,7 +22,7 @@ _COLOURS = {"proved": "green", "refuted": "red", "checked numerically": "yellow"
 
 @click.command("check")
 @many_specs
-@click.option("--order", type=ORDER, help="Order of the method, instead of the spec's.")
+@click.option("--order", metavar="K", type=ORDER, help="Order of the method, instead of the spec's.")
 @scheme_option
 @click.option("--json", "as_json", is_flag=True, help="For machines: one object per spec.")
 @verbosity

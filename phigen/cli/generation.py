@@ -72,7 +72,7 @@ def output_options(command: F) -> F:
         click.option("--tangent", is_flag=True, help="Generate step_tangent, the derivative of a step, too."),
         click.option("--single-file", is_flag=True, help="C in one file, NAME.c, without a header."),
         scheme_option,
-        click.option("--order", type=ORDER, help="Order of the method, instead of the spec's."),
+        click.option("--order", metavar="K", type=ORDER, help="Order of the method, instead of the spec's."),
         click.option(
             "-t",
             "--target",

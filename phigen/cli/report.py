@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 @one_spec
 @click.option("-o", "--output", metavar="FILE", help="Where to write the page; - is stdout.  [default: NAME.html]")
 @click.option("--run", "name", metavar="NAME", help="Which run of the spec.  [default: the first]")
-@click.option("--order", type=ORDER, help="Order of the method, instead of the spec's.")
+@click.option("--order", metavar="K", type=ORDER, help="Order of the method, instead of the spec's.")
 @scheme_option
 @click.option("--lyapunov", is_flag=True, help="Lyapunov exponents of the run as well.")
 @click.option("--quick", is_flag=True, help="Fewer steps, fewer repetitions.")

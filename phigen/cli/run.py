@@ -25,10 +25,10 @@ _TABLES = (".csv", ".npz")
 @one_spec
 @click.option("--run", "name", metavar="NAME", help="Which run of the spec.  [default: the first]")
 @click.option("-t", "--target", type=click.Choice(["auto", "c", "numpy"]), default="auto", show_default=True)
-@click.option("--order", type=ORDER, help="Order of the method, instead of the spec's.")
+@click.option("--order", metavar="K", type=ORDER, help="Order of the method, instead of the spec's.")
 @scheme_option
-@click.option("--step", type=float, help="Step size, instead of the run's.")
-@click.option("--steps", type=click.IntRange(min=1), help="Number of steps, instead of the run's.")
+@click.option("--step", metavar="H", type=float, help="Step size, instead of the run's.")
+@click.option("--steps", metavar="N", type=click.IntRange(min=1), help="Number of steps, instead of the run's.")
 @click.option("--set", "settings", metavar="NAME=VALUE", multiple=True, help="A parameter, or an initial coordinate.")
 @click.option(
     "-o", "--output", metavar="FILE", callback=file_ending(*_TABLES), help="Store the trajectory: FILE.csv or FILE.npz."

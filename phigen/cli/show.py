@@ -19,10 +19,12 @@ if TYPE_CHECKING:
 
 @click.command("show")
 @one_spec
-@click.option("--order", type=ORDER, help="Order of the method, instead of the spec's.")
+@click.option("--order", metavar="K", type=ORDER, help="Order of the method, instead of the spec's.")
 @scheme_option
 @click.option("--full", is_flag=True, help="All terms of long formulas.")
-@click.option("--modified", type=CORRECTIONS, default=0, help="So many corrections of the modified Hamiltonian.")
+@click.option(
+    "--modified", metavar="N", type=CORRECTIONS, default=0, help="So many corrections of the modified Hamiltonian."
+)
 @click.option("--latex", "as_latex", is_flag=True, help="The formulas as LaTeX, ready for \\input.")
 @click.option("--json", "as_json", is_flag=True, help="For machines: one object of texts.")
 @verbosity

@@ -29,7 +29,7 @@ _NOT_FINITE = {math.inf: "∞", -math.inf: "-∞"}
 @click.command("verify")
 @many_specs
 @click.option("--run", "name", metavar="NAME", help="Which run of the spec.  [default: the first]")
-@click.option("--order", type=ORDER, help="Order of the method, instead of the spec's.")
+@click.option("--order", metavar="K", type=ORDER, help="Order of the method, instead of the spec's.")
 @scheme_option
 @click.option("--quick", is_flag=True, help="Fewer steps.")
 @click.option("--plot", metavar="FILE", callback=file_ending(*FIGURES),

@@ -28,7 +28,7 @@ definitions:
   kinetic: (x1**2/I1 + x2**2/I2 + x3**2/I3)/2
 
 # The Poisson structure, in exactly one of the forms matrix, brackets, canonical, log_canonical,
-# lie_algebra and nambu. Brackets that are not given are 0.
+# lie_algebra, nambu, product and pullback. Brackets that are not given are 0.
 poisson:
   brackets:
     x1: {{x2: -x3, x3: x2}}

@@ -93,11 +93,11 @@ def _name(node: Scalar | None, declared: Declarations) -> str:
         return ""
     if node.text in KEYWORDS:
         declared.reader.error(
-            node, f"the spec name {node.text!r} is a keyword of C, C++ or Python", f"{node.text}_system"
+            node, f"the spec name {node.text!r} is a keyword of C, C++ or Python", f"{node.text}_system would do"
         )
     elif node.text in TAKEN:
         message = f"the spec name {node.text!r} would hide a standard header or module of that name"
-        declared.reader.error(node, message, f"{node.text}_system")
+        declared.reader.error(node, message, f"{node.text}_system would do")
     return node.text
 
 

@@ -1,6 +1,7 @@
 """What holds for every command: imports, exit codes, streams, colours, interrupts."""
 
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -8,6 +9,7 @@ import time
 
 import pytest
 
+from phigen import resources
 from phigen.cli import COMMANDS, group
 from phigen.errors import LimitError
 
@@ -38,6 +40,14 @@ def test_every_command_has_help_quiet_and_verbose(phigen):
         assert shown.exit_code == 0
         assert "--quiet" in shown.output
         assert "--verbose" in shown.output
+
+
+def test_every_option_is_documented_and_says_what_it_takes(phigen):
+    page = (resources.bundled_specs().parent / "docs" / "commands.md").read_text(encoding="utf-8")
+    for name in COMMANDS:
+        shown = phigen(name, "--help").output
+        assert {o for o in re.findall(r"--[a-z-]+", shown) if o not in page} <= {"--help", "--quiet", "--verbose"}, name
+        assert not re.search(r"\b(INTEGER|FLOAT|TEXT|PATH)\b", shown), name
 
 
 def test_wrong_spec_is_1_with_all_errors_on_stderr(phigen, write):
