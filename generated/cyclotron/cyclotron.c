@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 9e714c8ac06474ac89af4b9b81707733c70072ec948e86e84e6ba1d7c0889d36
+ * body-sha256: 0cac0421965d82426eec7df3279bcfc4341b892a9cab9e95cb2050e4740af8b1
  */
 #include "cyclotron.h"
 
@@ -212,11 +212,12 @@ static void cyclotron_train(cyclotron_memory *memory, int component)
     }
     for (int k = 0; k < WINDOW; ++k) q[ROWS + k][k] = 1e-13 * largest;
     for (int k = 0; k < WINDOW; ++k) {
-        for (int i = 0; i < ROWS + WINDOW; ++i)
+        const int rows = ROWS + k + 1; /* further rows of the ridge are still zero in this column */
+        for (int i = 0; i < rows; ++i)
             for (int j = k; j < WINDOW + AHEAD; ++j) r[k][j] += q[i][k] * q[i][j];
         const double scale = r[k][k] > 0.0 ? 1.0 / r[k][k] : 0.0;
         for (int j = k + 1; j < WINDOW + AHEAD; ++j) r[k][j] *= scale;
-        for (int i = 0; i < ROWS + WINDOW; ++i)
+        for (int i = 0; i < rows; ++i)
             for (int j = k + 1; j < WINDOW + AHEAD; ++j) q[i][j] -= q[i][k] * r[k][j];
     }
     for (int l = 0; l < AHEAD; ++l)
@@ -584,15 +585,16 @@ static void cyclotron_correct(cyclotron_lines *line, cyclotron_lanes size)
         for (int lane = 0; lane < cyclotron_LANES; ++lane) line->y[i][lane] -= delta[i][lane];
 }
 
-/* The largest size; infinite if one is not finite. */
+/* The largest size; infinite if one is not finite. As integers, the bits of numbers that are not negative have their
+   order, and those of what is no number are larger. */
 static double cyclotron_largest(const cyclotron_lanes size)
 {
-    double largest = 0.0, total = 0.0;
-    for (int lane = 0; lane < cyclotron_LANES; ++lane) {
-        total += size[lane];
-        largest = size[lane] > largest ? size[lane] : largest;
-    }
-    return isfinite(total) ? largest : HUGE_VAL;
+    uint64_t bits[8], most = 0;
+    double largest;
+    memcpy(bits, size, sizeof bits);
+    for (int lane = 0; lane < cyclotron_LANES; ++lane) most = bits[lane] > most ? bits[lane] : most;
+    memcpy(&largest, &most, sizeof largest);
+    return isfinite(largest) ? largest : HUGE_VAL;
 }
 
 /* What is left after a correction of this size: quadratic in it, where the matrices are of the points corrected; where
@@ -625,16 +627,18 @@ static void cyclotron_chain(cyclotron_lines line[1], double x[3], double carry[3
     for (int k = 0; k < 1 * cyclotron_LANES; ++k) {
         const int lane = k / 1, after = (k + 1) / 1 % cyclotron_LANES;
         cyclotron_lines *at = &line[k % 1], *next = &line[(k + 1) % 1];
-        double correction[3] = { 0.0 };
+        double even[3] = { 0.0 }, odd[3] = { 0.0 }; /* two sums, so that no long chain of additions is waited for */
         for (int i = 0; i < 3; ++i) {
             at->residual[i][lane] = residual[i];
-            for (int j = 0; j < 3; ++j) correction[i] -= at->gain[i * 3 + j][lane] * residual[j];
+            for (int j = 0; j < 3; j += 2) even[i] += at->gain[i * 3 + j][lane] * residual[j];
+            for (int j = 1; j < 3; j += 2) odd[i] += at->gain[i * 3 + j][lane] * residual[j];
         }
         for (int i = 0; i < 3; ++i) {
             const double change = at->increment[i][lane], total = sum[i] + change, added = total - sum[i];
             const double turn = (next->displacement[i][after] - at->displacement[i][lane]) - change;
-            residual[i] = ((next->y[i][after] - at->y[i][lane]) + turn) + (residual[i] - correction[i]);
-            small[i] += ((sum[i] - (total - added)) + (change - added)) + correction[i];
+            const double moved = (next->y[i][after] - at->y[i][lane]) + turn;
+            residual[i] = ((moved + residual[i]) + odd[i]) + even[i];
+            small[i] += ((sum[i] - (total - added)) + (change - added)) - (even[i] + odd[i]);
             sum[i] = total;
         }
     }
@@ -728,7 +732,8 @@ static int cyclotron_block(cyclotron_solver *s, cyclotron_table *table, int most
         cyclotron_chain(line, x, carry);
         for (int stage = 0; stage < 1; ++stage) {
             cyclotron_correct(&line[stage], sizes);
-            size = fmax(size, cyclotron_largest(sizes));
+            const double largest = cyclotron_largest(sizes);
+            size = largest > size ? largest : size;
         }
         s->evaluations += 1 * cyclotron_LANES;
         bend = matrices ? 0.0 : bend + previous;
@@ -913,10 +918,12 @@ static void cyclotron_group_judge(cyclotron_group *group, int stage, cyclotron_l
     group->fitting[stage] = cyclotron_group_sum(group, row[0]) <= least;
 }
 
-/* Fit the recurrences of all members; with every time, wait longer before it is done again. */
+/* Fit the recurrences of all members; with every time, wait longer before it is done again, and for long if it did not
+   help. */
 static void cyclotron_group_fit(cyclotron_group *group)
 {
     cyclotron_memory memory;
+    const int helped = group->fits == 0 || group->fitting[0];
     memory.count = 96;
     for (int stage = 0; stage < 1; ++stage)
         for (int lane = 0; lane < cyclotron_LANES; ++lane) {
@@ -931,7 +938,7 @@ static void cyclotron_group_fit(cyclotron_group *group)
         }
     ++group->fits;
     group->slow = 0;
-    group->patience = group->patience < 10000 ? 2 * group->patience + 1000 : 20000;
+    group->patience = helped && group->patience < 10000 ? 2 * group->patience + 1000 : 100 * 1000;
 }
 
 /* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group.
@@ -999,8 +1006,8 @@ static void cyclotron_group_advance(cyclotron_lanes x[restrict 3], cyclotron_lan
     }
 }
 
-/* One step of all members. One that fails keeps its state, and leaves. How many are left. */
-static int cyclotron_group_step(cyclotron_group *group)
+/* One step of all members, of as many as remain. One that fails keeps its state, and leaves. How many are left. */
+static int cyclotron_group_step(cyclotron_group *group, size_t remaining)
 {
     cyclotron_lanes x[3], carry[3];
     cyclotron_lines line;
@@ -1018,7 +1025,8 @@ static int cyclotron_group_step(cyclotron_group *group)
     group->latest = next;
     if (group->count < 96) ++group->count;
     group->slow = most > 1 ? group->slow + 1 : 0;
-    if (group->slow > group->patience && group->count == 96) cyclotron_group_fit(group);
+    if (group->slow > group->patience && group->count == 96 && remaining >= 4000)
+        cyclotron_group_fit(group);
     for (int lane = 0; lane < cyclotron_LANES; ++lane) {
         for (int i = 0; i < 3; ++i)
             if (!isfinite(group->x[i][lane])) group->active[lane] = 0;
@@ -1069,13 +1077,12 @@ static cyclotron_status cyclotron_group_run(const cyclotron_params *params, doub
     const int count = members - first < cyclotron_LANES ? (int)(members - first) : cyclotron_LANES;
     double state[3];
     memset(&group, 0, sizeof group);
-    group.patience = 1000;
     for (int lane = 0; lane < count; ++lane) {
         for (size_t i = 0; i < 3; ++i) state[i] = x[i * members + first + (size_t)lane];
         group.left[lane] = steps;
         member[lane] = cyclotron_group_join(&group, lane, params, state, h);
     }
-    for (size_t k = 0; k < steps && cyclotron_group_step(&group) > 2; ++k) continue;
+    for (size_t k = 0; k < steps && cyclotron_group_step(&group, steps - k) > 2; ++k) continue;
     for (int lane = 0; lane < count; ++lane) {
         for (int i = 0; i < 3; ++i) state[i] = group.x[i][lane];
         if (member[lane] == cyclotron_OK) {

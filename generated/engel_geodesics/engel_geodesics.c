@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 2c4b1c7499042eae834c39cceac496f92445e0d19a1e0dc0554f3dcb0a1a56ba
+ * body-sha256: b4ec355255c44cfe29e91d066caf3d81b437250eeb29f820bfa450daa64dae1a
  */
 #include "engel_geodesics.h"
 
@@ -252,11 +252,12 @@ static void engel_geodesics_train(engel_geodesics_memory *memory, int component)
     }
     for (int k = 0; k < WINDOW; ++k) q[ROWS + k][k] = 1e-13 * largest;
     for (int k = 0; k < WINDOW; ++k) {
-        for (int i = 0; i < ROWS + WINDOW; ++i)
+        const int rows = ROWS + k + 1; /* further rows of the ridge are still zero in this column */
+        for (int i = 0; i < rows; ++i)
             for (int j = k; j < WINDOW + AHEAD; ++j) r[k][j] += q[i][k] * q[i][j];
         const double scale = r[k][k] > 0.0 ? 1.0 / r[k][k] : 0.0;
         for (int j = k + 1; j < WINDOW + AHEAD; ++j) r[k][j] *= scale;
-        for (int i = 0; i < ROWS + WINDOW; ++i)
+        for (int i = 0; i < rows; ++i)
             for (int j = k + 1; j < WINDOW + AHEAD; ++j) q[i][j] -= q[i][k] * r[k][j];
     }
     for (int l = 0; l < AHEAD; ++l)
@@ -696,15 +697,16 @@ static void engel_geodesics_correct(engel_geodesics_lines *line, engel_geodesics
         for (int lane = 0; lane < engel_geodesics_LANES; ++lane) line->y[i][lane] -= delta[i][lane];
 }
 
-/* The largest size; infinite if one is not finite. */
+/* The largest size; infinite if one is not finite. As integers, the bits of numbers that are not negative have their
+   order, and those of what is no number are larger. */
 static double engel_geodesics_largest(const engel_geodesics_lanes size)
 {
-    double largest = 0.0, total = 0.0;
-    for (int lane = 0; lane < engel_geodesics_LANES; ++lane) {
-        total += size[lane];
-        largest = size[lane] > largest ? size[lane] : largest;
-    }
-    return isfinite(total) ? largest : HUGE_VAL;
+    uint64_t bits[8], most = 0;
+    double largest;
+    memcpy(bits, size, sizeof bits);
+    for (int lane = 0; lane < engel_geodesics_LANES; ++lane) most = bits[lane] > most ? bits[lane] : most;
+    memcpy(&largest, &most, sizeof largest);
+    return isfinite(largest) ? largest : HUGE_VAL;
 }
 
 /* What is left after a correction of this size: quadratic in it, where the matrices are of the points corrected; where
@@ -737,16 +739,18 @@ static void engel_geodesics_chain(engel_geodesics_lines line[1], double x[4], do
     for (int k = 0; k < 1 * engel_geodesics_LANES; ++k) {
         const int lane = k / 1, after = (k + 1) / 1 % engel_geodesics_LANES;
         engel_geodesics_lines *at = &line[k % 1], *next = &line[(k + 1) % 1];
-        double correction[4] = { 0.0 };
+        double even[4] = { 0.0 }, odd[4] = { 0.0 }; /* two sums, so that no long chain of additions is waited for */
         for (int i = 0; i < 4; ++i) {
             at->residual[i][lane] = residual[i];
-            for (int j = 0; j < 4; ++j) correction[i] -= at->gain[i * 4 + j][lane] * residual[j];
+            for (int j = 0; j < 4; j += 2) even[i] += at->gain[i * 4 + j][lane] * residual[j];
+            for (int j = 1; j < 4; j += 2) odd[i] += at->gain[i * 4 + j][lane] * residual[j];
         }
         for (int i = 0; i < 4; ++i) {
             const double change = at->increment[i][lane], total = sum[i] + change, added = total - sum[i];
             const double turn = (next->displacement[i][after] - at->displacement[i][lane]) - change;
-            residual[i] = ((next->y[i][after] - at->y[i][lane]) + turn) + (residual[i] - correction[i]);
-            small[i] += ((sum[i] - (total - added)) + (change - added)) + correction[i];
+            const double moved = (next->y[i][after] - at->y[i][lane]) + turn;
+            residual[i] = ((moved + residual[i]) + odd[i]) + even[i];
+            small[i] += ((sum[i] - (total - added)) + (change - added)) - (even[i] + odd[i]);
             sum[i] = total;
         }
     }
@@ -840,7 +844,8 @@ static int engel_geodesics_block(engel_geodesics_solver *s, engel_geodesics_tabl
         engel_geodesics_chain(line, x, carry);
         for (int stage = 0; stage < 1; ++stage) {
             engel_geodesics_correct(&line[stage], sizes);
-            size = fmax(size, engel_geodesics_largest(sizes));
+            const double largest = engel_geodesics_largest(sizes);
+            size = largest > size ? largest : size;
         }
         s->evaluations += 1 * engel_geodesics_LANES;
         bend = matrices ? 0.0 : bend + previous;
@@ -1025,10 +1030,12 @@ static void engel_geodesics_group_judge(engel_geodesics_group *group, int stage,
     group->fitting[stage] = engel_geodesics_group_sum(group, row[0]) <= least;
 }
 
-/* Fit the recurrences of all members; with every time, wait longer before it is done again. */
+/* Fit the recurrences of all members; with every time, wait longer before it is done again, and for long if it did not
+   help. */
 static void engel_geodesics_group_fit(engel_geodesics_group *group)
 {
     engel_geodesics_memory memory;
+    const int helped = group->fits == 0 || group->fitting[0];
     memory.count = 96;
     for (int stage = 0; stage < 1; ++stage)
         for (int lane = 0; lane < engel_geodesics_LANES; ++lane) {
@@ -1043,7 +1050,7 @@ static void engel_geodesics_group_fit(engel_geodesics_group *group)
         }
     ++group->fits;
     group->slow = 0;
-    group->patience = group->patience < 10000 ? 2 * group->patience + 1000 : 20000;
+    group->patience = helped && group->patience < 10000 ? 2 * group->patience + 1000 : 100 * 1000;
 }
 
 /* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group.
@@ -1111,8 +1118,8 @@ static void engel_geodesics_group_advance(engel_geodesics_lanes x[restrict 4], e
     }
 }
 
-/* One step of all members. One that fails keeps its state, and leaves. How many are left. */
-static int engel_geodesics_group_step(engel_geodesics_group *group)
+/* One step of all members, of as many as remain. One that fails keeps its state, and leaves. How many are left. */
+static int engel_geodesics_group_step(engel_geodesics_group *group, size_t remaining)
 {
     engel_geodesics_lanes x[4], carry[4];
     engel_geodesics_lines line;
@@ -1130,7 +1137,8 @@ static int engel_geodesics_group_step(engel_geodesics_group *group)
     group->latest = next;
     if (group->count < 96) ++group->count;
     group->slow = most > 1 ? group->slow + 1 : 0;
-    if (group->slow > group->patience && group->count == 96) engel_geodesics_group_fit(group);
+    if (group->slow > group->patience && group->count == 96 && remaining >= 4000)
+        engel_geodesics_group_fit(group);
     for (int lane = 0; lane < engel_geodesics_LANES; ++lane) {
         for (int i = 0; i < 4; ++i)
             if (!isfinite(group->x[i][lane])) group->active[lane] = 0;
@@ -1181,13 +1189,12 @@ static engel_geodesics_status engel_geodesics_group_run(const engel_geodesics_pa
     const int count = members - first < engel_geodesics_LANES ? (int)(members - first) : engel_geodesics_LANES;
     double state[4];
     memset(&group, 0, sizeof group);
-    group.patience = 1000;
     for (int lane = 0; lane < count; ++lane) {
         for (size_t i = 0; i < 4; ++i) state[i] = x[i * members + first + (size_t)lane];
         group.left[lane] = steps;
         member[lane] = engel_geodesics_group_join(&group, lane, params, state, h);
     }
-    for (size_t k = 0; k < steps && engel_geodesics_group_step(&group) > 2; ++k) continue;
+    for (size_t k = 0; k < steps && engel_geodesics_group_step(&group, steps - k) > 2; ++k) continue;
     for (int lane = 0; lane < count; ++lane) {
         for (int i = 0; i < 4; ++i) state[i] = group.x[i][lane];
         if (member[lane] == engel_geodesics_OK) {

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: fb84021da60848a5a0b5f783411926024f3fb65a6ce9b60870252b4aeafa45a2
+ * body-sha256: 561ec9188a4cc87c26e3ad10ddc32ad48e604f46af91acda7d8b1d9dd71a0fba
  */
 #include "gaussian_moments.h"
 
@@ -359,11 +359,12 @@ static void gaussian_moments_train(gaussian_moments_memory *memory, int componen
     }
     for (int k = 0; k < WINDOW; ++k) q[ROWS + k][k] = 1e-13 * largest;
     for (int k = 0; k < WINDOW; ++k) {
-        for (int i = 0; i < ROWS + WINDOW; ++i)
+        const int rows = ROWS + k + 1; /* further rows of the ridge are still zero in this column */
+        for (int i = 0; i < rows; ++i)
             for (int j = k; j < WINDOW + AHEAD; ++j) r[k][j] += q[i][k] * q[i][j];
         const double scale = r[k][k] > 0.0 ? 1.0 / r[k][k] : 0.0;
         for (int j = k + 1; j < WINDOW + AHEAD; ++j) r[k][j] *= scale;
-        for (int i = 0; i < ROWS + WINDOW; ++i)
+        for (int i = 0; i < rows; ++i)
             for (int j = k + 1; j < WINDOW + AHEAD; ++j) q[i][j] -= q[i][k] * r[k][j];
     }
     for (int l = 0; l < AHEAD; ++l)
@@ -824,15 +825,16 @@ static void gaussian_moments_correct(gaussian_moments_lines *line, gaussian_mome
         for (int lane = 0; lane < gaussian_moments_LANES; ++lane) line->y[i][lane] -= delta[i][lane];
 }
 
-/* The largest size; infinite if one is not finite. */
+/* The largest size; infinite if one is not finite. As integers, the bits of numbers that are not negative have their
+   order, and those of what is no number are larger. */
 static double gaussian_moments_largest(const gaussian_moments_lanes size)
 {
-    double largest = 0.0, total = 0.0;
-    for (int lane = 0; lane < gaussian_moments_LANES; ++lane) {
-        total += size[lane];
-        largest = size[lane] > largest ? size[lane] : largest;
-    }
-    return isfinite(total) ? largest : HUGE_VAL;
+    uint64_t bits[8], most = 0;
+    double largest;
+    memcpy(bits, size, sizeof bits);
+    for (int lane = 0; lane < gaussian_moments_LANES; ++lane) most = bits[lane] > most ? bits[lane] : most;
+    memcpy(&largest, &most, sizeof largest);
+    return isfinite(largest) ? largest : HUGE_VAL;
 }
 
 /* What is left after a correction of this size: quadratic in it, where the matrices are of the points corrected; where
@@ -865,16 +867,18 @@ static void gaussian_moments_chain(gaussian_moments_lines line[1], double x[3], 
     for (int k = 0; k < 1 * gaussian_moments_LANES; ++k) {
         const int lane = k / 1, after = (k + 1) / 1 % gaussian_moments_LANES;
         gaussian_moments_lines *at = &line[k % 1], *next = &line[(k + 1) % 1];
-        double correction[3] = { 0.0 };
+        double even[3] = { 0.0 }, odd[3] = { 0.0 }; /* two sums, so that no long chain of additions is waited for */
         for (int i = 0; i < 3; ++i) {
             at->residual[i][lane] = residual[i];
-            for (int j = 0; j < 3; ++j) correction[i] -= at->gain[i * 3 + j][lane] * residual[j];
+            for (int j = 0; j < 3; j += 2) even[i] += at->gain[i * 3 + j][lane] * residual[j];
+            for (int j = 1; j < 3; j += 2) odd[i] += at->gain[i * 3 + j][lane] * residual[j];
         }
         for (int i = 0; i < 3; ++i) {
             const double change = at->increment[i][lane], total = sum[i] + change, added = total - sum[i];
             const double turn = (next->displacement[i][after] - at->displacement[i][lane]) - change;
-            residual[i] = ((next->y[i][after] - at->y[i][lane]) + turn) + (residual[i] - correction[i]);
-            small[i] += ((sum[i] - (total - added)) + (change - added)) + correction[i];
+            const double moved = (next->y[i][after] - at->y[i][lane]) + turn;
+            residual[i] = ((moved + residual[i]) + odd[i]) + even[i];
+            small[i] += ((sum[i] - (total - added)) + (change - added)) - (even[i] + odd[i]);
             sum[i] = total;
         }
     }
@@ -968,7 +972,8 @@ static int gaussian_moments_block(gaussian_moments_solver *s, gaussian_moments_t
         gaussian_moments_chain(line, x, carry);
         for (int stage = 0; stage < 1; ++stage) {
             gaussian_moments_correct(&line[stage], sizes);
-            size = fmax(size, gaussian_moments_largest(sizes));
+            const double largest = gaussian_moments_largest(sizes);
+            size = largest > size ? largest : size;
         }
         s->evaluations += 1 * gaussian_moments_LANES;
         bend = matrices ? 0.0 : bend + previous;
@@ -1153,10 +1158,12 @@ static void gaussian_moments_group_judge(gaussian_moments_group *group, int stag
     group->fitting[stage] = gaussian_moments_group_sum(group, row[0]) <= least;
 }
 
-/* Fit the recurrences of all members; with every time, wait longer before it is done again. */
+/* Fit the recurrences of all members; with every time, wait longer before it is done again, and for long if it did not
+   help. */
 static void gaussian_moments_group_fit(gaussian_moments_group *group)
 {
     gaussian_moments_memory memory;
+    const int helped = group->fits == 0 || group->fitting[0];
     memory.count = 96;
     for (int stage = 0; stage < 1; ++stage)
         for (int lane = 0; lane < gaussian_moments_LANES; ++lane) {
@@ -1171,7 +1178,7 @@ static void gaussian_moments_group_fit(gaussian_moments_group *group)
         }
     ++group->fits;
     group->slow = 0;
-    group->patience = group->patience < 10000 ? 2 * group->patience + 1000 : 20000;
+    group->patience = helped && group->patience < 10000 ? 2 * group->patience + 1000 : 100 * 1000;
 }
 
 /* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group.
@@ -1239,8 +1246,8 @@ static void gaussian_moments_group_advance(gaussian_moments_lanes x[restrict 3],
     }
 }
 
-/* One step of all members. One that fails keeps its state, and leaves. How many are left. */
-static int gaussian_moments_group_step(gaussian_moments_group *group)
+/* One step of all members, of as many as remain. One that fails keeps its state, and leaves. How many are left. */
+static int gaussian_moments_group_step(gaussian_moments_group *group, size_t remaining)
 {
     gaussian_moments_lanes x[3], carry[3];
     gaussian_moments_lines line;
@@ -1258,7 +1265,8 @@ static int gaussian_moments_group_step(gaussian_moments_group *group)
     group->latest = next;
     if (group->count < 96) ++group->count;
     group->slow = most > 1 ? group->slow + 1 : 0;
-    if (group->slow > group->patience && group->count == 96) gaussian_moments_group_fit(group);
+    if (group->slow > group->patience && group->count == 96 && remaining >= 4000)
+        gaussian_moments_group_fit(group);
     for (int lane = 0; lane < gaussian_moments_LANES; ++lane) {
         for (int i = 0; i < 3; ++i)
             if (!isfinite(group->x[i][lane])) group->active[lane] = 0;
@@ -1309,13 +1317,12 @@ static gaussian_moments_status gaussian_moments_group_run(const gaussian_moments
     const int count = members - first < gaussian_moments_LANES ? (int)(members - first) : gaussian_moments_LANES;
     double state[3];
     memset(&group, 0, sizeof group);
-    group.patience = 1000;
     for (int lane = 0; lane < count; ++lane) {
         for (size_t i = 0; i < 3; ++i) state[i] = x[i * members + first + (size_t)lane];
         group.left[lane] = steps;
         member[lane] = gaussian_moments_group_join(&group, lane, params, state, h);
     }
-    for (size_t k = 0; k < steps && gaussian_moments_group_step(&group) > 2; ++k) continue;
+    for (size_t k = 0; k < steps && gaussian_moments_group_step(&group, steps - k) > 2; ++k) continue;
     for (int lane = 0; lane < count; ++lane) {
         for (int i = 0; i < 3; ++i) state[i] = group.x[i][lane];
         if (member[lane] == gaussian_moments_OK) {

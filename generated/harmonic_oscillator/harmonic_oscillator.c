@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 066071094626ea67c335c11cd3dce5deaf07f253f29dd400fb4c2902d7379c42
+ * body-sha256: 6e6a918e541703bee78ea8f845df79dfb30f425d59f4781b01de9fb72e77c0ce
  */
 #include "harmonic_oscillator.h"
 
@@ -190,11 +190,12 @@ static void harmonic_oscillator_train(harmonic_oscillator_memory *memory, int co
     }
     for (int k = 0; k < WINDOW; ++k) q[ROWS + k][k] = 1e-13 * largest;
     for (int k = 0; k < WINDOW; ++k) {
-        for (int i = 0; i < ROWS + WINDOW; ++i)
+        const int rows = ROWS + k + 1; /* further rows of the ridge are still zero in this column */
+        for (int i = 0; i < rows; ++i)
             for (int j = k; j < WINDOW + AHEAD; ++j) r[k][j] += q[i][k] * q[i][j];
         const double scale = r[k][k] > 0.0 ? 1.0 / r[k][k] : 0.0;
         for (int j = k + 1; j < WINDOW + AHEAD; ++j) r[k][j] *= scale;
-        for (int i = 0; i < ROWS + WINDOW; ++i)
+        for (int i = 0; i < rows; ++i)
             for (int j = k + 1; j < WINDOW + AHEAD; ++j) q[i][j] -= q[i][k] * r[k][j];
     }
     for (int l = 0; l < AHEAD; ++l)
@@ -521,15 +522,16 @@ static void harmonic_oscillator_correct(harmonic_oscillator_lines *line, harmoni
         for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane) line->y[i][lane] -= delta[i][lane];
 }
 
-/* The largest size; infinite if one is not finite. */
+/* The largest size; infinite if one is not finite. As integers, the bits of numbers that are not negative have their
+   order, and those of what is no number are larger. */
 static double harmonic_oscillator_largest(const harmonic_oscillator_lanes size)
 {
-    double largest = 0.0, total = 0.0;
-    for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane) {
-        total += size[lane];
-        largest = size[lane] > largest ? size[lane] : largest;
-    }
-    return isfinite(total) ? largest : HUGE_VAL;
+    uint64_t bits[8], most = 0;
+    double largest;
+    memcpy(bits, size, sizeof bits);
+    for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane) most = bits[lane] > most ? bits[lane] : most;
+    memcpy(&largest, &most, sizeof largest);
+    return isfinite(largest) ? largest : HUGE_VAL;
 }
 
 /* What is left after a correction of this size: quadratic in it, where the matrices are of the points corrected; where
@@ -562,16 +564,18 @@ static void harmonic_oscillator_chain(harmonic_oscillator_lines line[1], double 
     for (int k = 0; k < 1 * harmonic_oscillator_LANES; ++k) {
         const int lane = k / 1, after = (k + 1) / 1 % harmonic_oscillator_LANES;
         harmonic_oscillator_lines *at = &line[k % 1], *next = &line[(k + 1) % 1];
-        double correction[2] = { 0.0 };
+        double even[2] = { 0.0 }, odd[2] = { 0.0 }; /* two sums, so that no long chain of additions is waited for */
         for (int i = 0; i < 2; ++i) {
             at->residual[i][lane] = residual[i];
-            for (int j = 0; j < 2; ++j) correction[i] -= at->gain[i * 2 + j][lane] * residual[j];
+            for (int j = 0; j < 2; j += 2) even[i] += at->gain[i * 2 + j][lane] * residual[j];
+            for (int j = 1; j < 2; j += 2) odd[i] += at->gain[i * 2 + j][lane] * residual[j];
         }
         for (int i = 0; i < 2; ++i) {
             const double change = at->increment[i][lane], total = sum[i] + change, added = total - sum[i];
             const double turn = (next->displacement[i][after] - at->displacement[i][lane]) - change;
-            residual[i] = ((next->y[i][after] - at->y[i][lane]) + turn) + (residual[i] - correction[i]);
-            small[i] += ((sum[i] - (total - added)) + (change - added)) + correction[i];
+            const double moved = (next->y[i][after] - at->y[i][lane]) + turn;
+            residual[i] = ((moved + residual[i]) + odd[i]) + even[i];
+            small[i] += ((sum[i] - (total - added)) + (change - added)) - (even[i] + odd[i]);
             sum[i] = total;
         }
     }
@@ -665,7 +669,8 @@ static int harmonic_oscillator_block(harmonic_oscillator_solver *s, harmonic_osc
         harmonic_oscillator_chain(line, x, carry);
         for (int stage = 0; stage < 1; ++stage) {
             harmonic_oscillator_correct(&line[stage], sizes);
-            size = fmax(size, harmonic_oscillator_largest(sizes));
+            const double largest = harmonic_oscillator_largest(sizes);
+            size = largest > size ? largest : size;
         }
         s->evaluations += 1 * harmonic_oscillator_LANES;
         bend = matrices ? 0.0 : bend + previous;
@@ -850,10 +855,12 @@ static void harmonic_oscillator_group_judge(harmonic_oscillator_group *group, in
     group->fitting[stage] = harmonic_oscillator_group_sum(group, row[0]) <= least;
 }
 
-/* Fit the recurrences of all members; with every time, wait longer before it is done again. */
+/* Fit the recurrences of all members; with every time, wait longer before it is done again, and for long if it did not
+   help. */
 static void harmonic_oscillator_group_fit(harmonic_oscillator_group *group)
 {
     harmonic_oscillator_memory memory;
+    const int helped = group->fits == 0 || group->fitting[0];
     memory.count = 96;
     for (int stage = 0; stage < 1; ++stage)
         for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane) {
@@ -868,7 +875,7 @@ static void harmonic_oscillator_group_fit(harmonic_oscillator_group *group)
         }
     ++group->fits;
     group->slow = 0;
-    group->patience = group->patience < 10000 ? 2 * group->patience + 1000 : 20000;
+    group->patience = helped && group->patience < 10000 ? 2 * group->patience + 1000 : 100 * 1000;
 }
 
 /* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group.
@@ -936,8 +943,8 @@ static void harmonic_oscillator_group_advance(harmonic_oscillator_lanes x[restri
     }
 }
 
-/* One step of all members. One that fails keeps its state, and leaves. How many are left. */
-static int harmonic_oscillator_group_step(harmonic_oscillator_group *group)
+/* One step of all members, of as many as remain. One that fails keeps its state, and leaves. How many are left. */
+static int harmonic_oscillator_group_step(harmonic_oscillator_group *group, size_t remaining)
 {
     harmonic_oscillator_lanes x[2], carry[2];
     harmonic_oscillator_lines line;
@@ -955,7 +962,8 @@ static int harmonic_oscillator_group_step(harmonic_oscillator_group *group)
     group->latest = next;
     if (group->count < 96) ++group->count;
     group->slow = most > 1 ? group->slow + 1 : 0;
-    if (group->slow > group->patience && group->count == 96) harmonic_oscillator_group_fit(group);
+    if (group->slow > group->patience && group->count == 96 && remaining >= 4000)
+        harmonic_oscillator_group_fit(group);
     for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane) {
         for (int i = 0; i < 2; ++i)
             if (!isfinite(group->x[i][lane])) group->active[lane] = 0;
@@ -1006,13 +1014,12 @@ static harmonic_oscillator_status harmonic_oscillator_group_run(const harmonic_o
     const int count = members - first < harmonic_oscillator_LANES ? (int)(members - first) : harmonic_oscillator_LANES;
     double state[2];
     memset(&group, 0, sizeof group);
-    group.patience = 1000;
     for (int lane = 0; lane < count; ++lane) {
         for (size_t i = 0; i < 2; ++i) state[i] = x[i * members + first + (size_t)lane];
         group.left[lane] = steps;
         member[lane] = harmonic_oscillator_group_join(&group, lane, params, state, h);
     }
-    for (size_t k = 0; k < steps && harmonic_oscillator_group_step(&group) > 2; ++k) continue;
+    for (size_t k = 0; k < steps && harmonic_oscillator_group_step(&group, steps - k) > 2; ++k) continue;
     for (int lane = 0; lane < count; ++lane) {
         for (int i = 0; i < 2; ++i) state[i] = group.x[i][lane];
         if (member[lane] == harmonic_oscillator_OK) {

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 01b3af0ab5061501be6c93083b32eb1eef5a5858985f6a8495449e1435b3bf30
+ * body-sha256: 1bda4242603bdaf985b59e9e51e0601bc4941f9ef0fc5051abe27a0e56d9d728
  */
 #include "henon_heiles.h"
 
@@ -294,11 +294,12 @@ static void henon_heiles_train(henon_heiles_memory *memory, int component)
     }
     for (int k = 0; k < WINDOW; ++k) q[ROWS + k][k] = 1e-13 * largest;
     for (int k = 0; k < WINDOW; ++k) {
-        for (int i = 0; i < ROWS + WINDOW; ++i)
+        const int rows = ROWS + k + 1; /* further rows of the ridge are still zero in this column */
+        for (int i = 0; i < rows; ++i)
             for (int j = k; j < WINDOW + AHEAD; ++j) r[k][j] += q[i][k] * q[i][j];
         const double scale = r[k][k] > 0.0 ? 1.0 / r[k][k] : 0.0;
         for (int j = k + 1; j < WINDOW + AHEAD; ++j) r[k][j] *= scale;
-        for (int i = 0; i < ROWS + WINDOW; ++i)
+        for (int i = 0; i < rows; ++i)
             for (int j = k + 1; j < WINDOW + AHEAD; ++j) q[i][j] -= q[i][k] * r[k][j];
     }
     for (int l = 0; l < AHEAD; ++l)
@@ -753,15 +754,16 @@ static void henon_heiles_correct(henon_heiles_lines *line, henon_heiles_lanes si
         for (int lane = 0; lane < henon_heiles_LANES; ++lane) line->y[i][lane] -= delta[i][lane];
 }
 
-/* The largest size; infinite if one is not finite. */
+/* The largest size; infinite if one is not finite. As integers, the bits of numbers that are not negative have their
+   order, and those of what is no number are larger. */
 static double henon_heiles_largest(const henon_heiles_lanes size)
 {
-    double largest = 0.0, total = 0.0;
-    for (int lane = 0; lane < henon_heiles_LANES; ++lane) {
-        total += size[lane];
-        largest = size[lane] > largest ? size[lane] : largest;
-    }
-    return isfinite(total) ? largest : HUGE_VAL;
+    uint64_t bits[8], most = 0;
+    double largest;
+    memcpy(bits, size, sizeof bits);
+    for (int lane = 0; lane < henon_heiles_LANES; ++lane) most = bits[lane] > most ? bits[lane] : most;
+    memcpy(&largest, &most, sizeof largest);
+    return isfinite(largest) ? largest : HUGE_VAL;
 }
 
 /* What is left after a correction of this size: quadratic in it, where the matrices are of the points corrected; where
@@ -794,16 +796,18 @@ static void henon_heiles_chain(henon_heiles_lines line[1], double x[4], double c
     for (int k = 0; k < 1 * henon_heiles_LANES; ++k) {
         const int lane = k / 1, after = (k + 1) / 1 % henon_heiles_LANES;
         henon_heiles_lines *at = &line[k % 1], *next = &line[(k + 1) % 1];
-        double correction[4] = { 0.0 };
+        double even[4] = { 0.0 }, odd[4] = { 0.0 }; /* two sums, so that no long chain of additions is waited for */
         for (int i = 0; i < 4; ++i) {
             at->residual[i][lane] = residual[i];
-            for (int j = 0; j < 4; ++j) correction[i] -= at->gain[i * 4 + j][lane] * residual[j];
+            for (int j = 0; j < 4; j += 2) even[i] += at->gain[i * 4 + j][lane] * residual[j];
+            for (int j = 1; j < 4; j += 2) odd[i] += at->gain[i * 4 + j][lane] * residual[j];
         }
         for (int i = 0; i < 4; ++i) {
             const double change = at->increment[i][lane], total = sum[i] + change, added = total - sum[i];
             const double turn = (next->displacement[i][after] - at->displacement[i][lane]) - change;
-            residual[i] = ((next->y[i][after] - at->y[i][lane]) + turn) + (residual[i] - correction[i]);
-            small[i] += ((sum[i] - (total - added)) + (change - added)) + correction[i];
+            const double moved = (next->y[i][after] - at->y[i][lane]) + turn;
+            residual[i] = ((moved + residual[i]) + odd[i]) + even[i];
+            small[i] += ((sum[i] - (total - added)) + (change - added)) - (even[i] + odd[i]);
             sum[i] = total;
         }
     }
@@ -897,7 +901,8 @@ static int henon_heiles_block(henon_heiles_solver *s, henon_heiles_table *table,
         henon_heiles_chain(line, x, carry);
         for (int stage = 0; stage < 1; ++stage) {
             henon_heiles_correct(&line[stage], sizes);
-            size = fmax(size, henon_heiles_largest(sizes));
+            const double largest = henon_heiles_largest(sizes);
+            size = largest > size ? largest : size;
         }
         s->evaluations += 1 * henon_heiles_LANES;
         bend = matrices ? 0.0 : bend + previous;
@@ -1082,10 +1087,12 @@ static void henon_heiles_group_judge(henon_heiles_group *group, int stage, henon
     group->fitting[stage] = henon_heiles_group_sum(group, row[0]) <= least;
 }
 
-/* Fit the recurrences of all members; with every time, wait longer before it is done again. */
+/* Fit the recurrences of all members; with every time, wait longer before it is done again, and for long if it did not
+   help. */
 static void henon_heiles_group_fit(henon_heiles_group *group)
 {
     henon_heiles_memory memory;
+    const int helped = group->fits == 0 || group->fitting[0];
     memory.count = 96;
     for (int stage = 0; stage < 1; ++stage)
         for (int lane = 0; lane < henon_heiles_LANES; ++lane) {
@@ -1100,7 +1107,7 @@ static void henon_heiles_group_fit(henon_heiles_group *group)
         }
     ++group->fits;
     group->slow = 0;
-    group->patience = group->patience < 10000 ? 2 * group->patience + 1000 : 20000;
+    group->patience = helped && group->patience < 10000 ? 2 * group->patience + 1000 : 100 * 1000;
 }
 
 /* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group.
@@ -1168,8 +1175,8 @@ static void henon_heiles_group_advance(henon_heiles_lanes x[restrict 4], henon_h
     }
 }
 
-/* One step of all members. One that fails keeps its state, and leaves. How many are left. */
-static int henon_heiles_group_step(henon_heiles_group *group)
+/* One step of all members, of as many as remain. One that fails keeps its state, and leaves. How many are left. */
+static int henon_heiles_group_step(henon_heiles_group *group, size_t remaining)
 {
     henon_heiles_lanes x[4], carry[4];
     henon_heiles_lines line;
@@ -1187,7 +1194,8 @@ static int henon_heiles_group_step(henon_heiles_group *group)
     group->latest = next;
     if (group->count < 96) ++group->count;
     group->slow = most > 1 ? group->slow + 1 : 0;
-    if (group->slow > group->patience && group->count == 96) henon_heiles_group_fit(group);
+    if (group->slow > group->patience && group->count == 96 && remaining >= 4000)
+        henon_heiles_group_fit(group);
     for (int lane = 0; lane < henon_heiles_LANES; ++lane) {
         for (int i = 0; i < 4; ++i)
             if (!isfinite(group->x[i][lane])) group->active[lane] = 0;
@@ -1238,13 +1246,12 @@ static henon_heiles_status henon_heiles_group_run(const henon_heiles_params *par
     const int count = members - first < henon_heiles_LANES ? (int)(members - first) : henon_heiles_LANES;
     double state[4];
     memset(&group, 0, sizeof group);
-    group.patience = 1000;
     for (int lane = 0; lane < count; ++lane) {
         for (size_t i = 0; i < 4; ++i) state[i] = x[i * members + first + (size_t)lane];
         group.left[lane] = steps;
         member[lane] = henon_heiles_group_join(&group, lane, params, state, h);
     }
-    for (size_t k = 0; k < steps && henon_heiles_group_step(&group) > 2; ++k) continue;
+    for (size_t k = 0; k < steps && henon_heiles_group_step(&group, steps - k) > 2; ++k) continue;
     for (int lane = 0; lane < count; ++lane) {
         for (int i = 0; i < 4; ++i) state[i] = group.x[i][lane];
         if (member[lane] == henon_heiles_OK) {

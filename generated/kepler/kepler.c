@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 268ef202b9c3f322477a8533e1b4eea68994c9f7dcabfb16c7951241dad12370
+ * body-sha256: fb80d5e6e87ed90c018bb224bcf4924ff62437ebe85b1b136e6baa094f66e82c
  */
 #include "kepler.h"
 
@@ -605,11 +605,12 @@ static void kepler_train(kepler_memory *memory, int component)
     }
     for (int k = 0; k < WINDOW; ++k) q[ROWS + k][k] = 1e-13 * largest;
     for (int k = 0; k < WINDOW; ++k) {
-        for (int i = 0; i < ROWS + WINDOW; ++i)
+        const int rows = ROWS + k + 1; /* further rows of the ridge are still zero in this column */
+        for (int i = 0; i < rows; ++i)
             for (int j = k; j < WINDOW + AHEAD; ++j) r[k][j] += q[i][k] * q[i][j];
         const double scale = r[k][k] > 0.0 ? 1.0 / r[k][k] : 0.0;
         for (int j = k + 1; j < WINDOW + AHEAD; ++j) r[k][j] *= scale;
-        for (int i = 0; i < ROWS + WINDOW; ++i)
+        for (int i = 0; i < rows; ++i)
             for (int j = k + 1; j < WINDOW + AHEAD; ++j) q[i][j] -= q[i][k] * r[k][j];
     }
     for (int l = 0; l < AHEAD; ++l)
@@ -1275,15 +1276,16 @@ static void kepler_correct(kepler_lines *line, kepler_lanes size)
         for (int lane = 0; lane < kepler_LANES; ++lane) line->y[i][lane] -= delta[i][lane];
 }
 
-/* The largest size; infinite if one is not finite. */
+/* The largest size; infinite if one is not finite. As integers, the bits of numbers that are not negative have their
+   order, and those of what is no number are larger. */
 static double kepler_largest(const kepler_lanes size)
 {
-    double largest = 0.0, total = 0.0;
-    for (int lane = 0; lane < kepler_LANES; ++lane) {
-        total += size[lane];
-        largest = size[lane] > largest ? size[lane] : largest;
-    }
-    return isfinite(total) ? largest : HUGE_VAL;
+    uint64_t bits[8], most = 0;
+    double largest;
+    memcpy(bits, size, sizeof bits);
+    for (int lane = 0; lane < kepler_LANES; ++lane) most = bits[lane] > most ? bits[lane] : most;
+    memcpy(&largest, &most, sizeof largest);
+    return isfinite(largest) ? largest : HUGE_VAL;
 }
 
 /* What is left after a correction of this size: quadratic in it, where the matrices are of the points corrected; where
@@ -1316,16 +1318,18 @@ static void kepler_chain(kepler_lines line[1], double x[4], double carry[4])
     for (int k = 0; k < 1 * kepler_LANES; ++k) {
         const int lane = k / 1, after = (k + 1) / 1 % kepler_LANES;
         kepler_lines *at = &line[k % 1], *next = &line[(k + 1) % 1];
-        double correction[4] = { 0.0 };
+        double even[4] = { 0.0 }, odd[4] = { 0.0 }; /* two sums, so that no long chain of additions is waited for */
         for (int i = 0; i < 4; ++i) {
             at->residual[i][lane] = residual[i];
-            for (int j = 0; j < 4; ++j) correction[i] -= at->gain[i * 4 + j][lane] * residual[j];
+            for (int j = 0; j < 4; j += 2) even[i] += at->gain[i * 4 + j][lane] * residual[j];
+            for (int j = 1; j < 4; j += 2) odd[i] += at->gain[i * 4 + j][lane] * residual[j];
         }
         for (int i = 0; i < 4; ++i) {
             const double change = at->increment[i][lane], total = sum[i] + change, added = total - sum[i];
             const double turn = (next->displacement[i][after] - at->displacement[i][lane]) - change;
-            residual[i] = ((next->y[i][after] - at->y[i][lane]) + turn) + (residual[i] - correction[i]);
-            small[i] += ((sum[i] - (total - added)) + (change - added)) + correction[i];
+            const double moved = (next->y[i][after] - at->y[i][lane]) + turn;
+            residual[i] = ((moved + residual[i]) + odd[i]) + even[i];
+            small[i] += ((sum[i] - (total - added)) + (change - added)) - (even[i] + odd[i]);
             sum[i] = total;
         }
     }
@@ -1419,7 +1423,8 @@ static int kepler_block(kepler_solver *s, kepler_table *table, int most)
         kepler_chain(line, x, carry);
         for (int stage = 0; stage < 1; ++stage) {
             kepler_correct(&line[stage], sizes);
-            size = fmax(size, kepler_largest(sizes));
+            const double largest = kepler_largest(sizes);
+            size = largest > size ? largest : size;
         }
         s->evaluations += 1 * kepler_LANES;
         bend = matrices ? 0.0 : bend + previous;
@@ -1604,10 +1609,12 @@ static void kepler_group_judge(kepler_group *group, int stage, kepler_lanes y[4]
     group->fitting[stage] = kepler_group_sum(group, row[0]) <= least;
 }
 
-/* Fit the recurrences of all members; with every time, wait longer before it is done again. */
+/* Fit the recurrences of all members; with every time, wait longer before it is done again, and for long if it did not
+   help. */
 static void kepler_group_fit(kepler_group *group)
 {
     kepler_memory memory;
+    const int helped = group->fits == 0 || group->fitting[0];
     memory.count = 96;
     for (int stage = 0; stage < 1; ++stage)
         for (int lane = 0; lane < kepler_LANES; ++lane) {
@@ -1622,7 +1629,7 @@ static void kepler_group_fit(kepler_group *group)
         }
     ++group->fits;
     group->slow = 0;
-    group->patience = group->patience < 10000 ? 2 * group->patience + 1000 : 20000;
+    group->patience = helped && group->patience < 10000 ? 2 * group->patience + 1000 : 100 * 1000;
 }
 
 /* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group.
@@ -1690,8 +1697,8 @@ static void kepler_group_advance(kepler_lanes x[restrict 4], kepler_lanes carry[
     }
 }
 
-/* One step of all members. One that fails keeps its state, and leaves. How many are left. */
-static int kepler_group_step(kepler_group *group)
+/* One step of all members, of as many as remain. One that fails keeps its state, and leaves. How many are left. */
+static int kepler_group_step(kepler_group *group, size_t remaining)
 {
     kepler_lanes x[4], carry[4];
     kepler_lines line;
@@ -1709,7 +1716,8 @@ static int kepler_group_step(kepler_group *group)
     group->latest = next;
     if (group->count < 96) ++group->count;
     group->slow = most > 1 ? group->slow + 1 : 0;
-    if (group->slow > group->patience && group->count == 96) kepler_group_fit(group);
+    if (group->slow > group->patience && group->count == 96 && remaining >= 4000)
+        kepler_group_fit(group);
     for (int lane = 0; lane < kepler_LANES; ++lane) {
         for (int i = 0; i < 4; ++i)
             if (!isfinite(group->x[i][lane])) group->active[lane] = 0;
@@ -1760,13 +1768,12 @@ static kepler_status kepler_group_run(const kepler_params *params, double *x, si
     const int count = members - first < kepler_LANES ? (int)(members - first) : kepler_LANES;
     double state[4];
     memset(&group, 0, sizeof group);
-    group.patience = 1000;
     for (int lane = 0; lane < count; ++lane) {
         for (size_t i = 0; i < 4; ++i) state[i] = x[i * members + first + (size_t)lane];
         group.left[lane] = steps;
         member[lane] = kepler_group_join(&group, lane, params, state, h);
     }
-    for (size_t k = 0; k < steps && kepler_group_step(&group) > 2; ++k) continue;
+    for (size_t k = 0; k < steps && kepler_group_step(&group, steps - k) > 2; ++k) continue;
     for (int lane = 0; lane < count; ++lane) {
         for (int i = 0; i < 4; ++i) state[i] = group.x[i][lane];
         if (member[lane] == kepler_OK) {

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: bce61df4b1a668ab701e1b1af76ab46304ff5c780bf68b20b30dd74acbb27859
+ * body-sha256: 11b1d466bf1e0899e9a8b0aa1fa58d43e7802cf9f3cd7fc7ad7ce1e4a2429dd4
  */
 #include "kowalevski_top.h"
 
@@ -1118,11 +1118,12 @@ static void kowalevski_top_train(kowalevski_top_memory *memory, int component)
     }
     for (int k = 0; k < WINDOW; ++k) q[ROWS + k][k] = 1e-13 * largest;
     for (int k = 0; k < WINDOW; ++k) {
-        for (int i = 0; i < ROWS + WINDOW; ++i)
+        const int rows = ROWS + k + 1; /* further rows of the ridge are still zero in this column */
+        for (int i = 0; i < rows; ++i)
             for (int j = k; j < WINDOW + AHEAD; ++j) r[k][j] += q[i][k] * q[i][j];
         const double scale = r[k][k] > 0.0 ? 1.0 / r[k][k] : 0.0;
         for (int j = k + 1; j < WINDOW + AHEAD; ++j) r[k][j] *= scale;
-        for (int i = 0; i < ROWS + WINDOW; ++i)
+        for (int i = 0; i < rows; ++i)
             for (int j = k + 1; j < WINDOW + AHEAD; ++j) q[i][j] -= q[i][k] * r[k][j];
     }
     for (int l = 0; l < AHEAD; ++l)
@@ -2279,15 +2280,16 @@ static void kowalevski_top_correct(kowalevski_top_lines *line, kowalevski_top_la
         for (int lane = 0; lane < kowalevski_top_LANES; ++lane) line->y[i][lane] -= delta[i][lane];
 }
 
-/* The largest size; infinite if one is not finite. */
+/* The largest size; infinite if one is not finite. As integers, the bits of numbers that are not negative have their
+   order, and those of what is no number are larger. */
 static double kowalevski_top_largest(const kowalevski_top_lanes size)
 {
-    double largest = 0.0, total = 0.0;
-    for (int lane = 0; lane < kowalevski_top_LANES; ++lane) {
-        total += size[lane];
-        largest = size[lane] > largest ? size[lane] : largest;
-    }
-    return isfinite(total) ? largest : HUGE_VAL;
+    uint64_t bits[8], most = 0;
+    double largest;
+    memcpy(bits, size, sizeof bits);
+    for (int lane = 0; lane < kowalevski_top_LANES; ++lane) most = bits[lane] > most ? bits[lane] : most;
+    memcpy(&largest, &most, sizeof largest);
+    return isfinite(largest) ? largest : HUGE_VAL;
 }
 
 /* What is left after a correction of this size: quadratic in it, where the matrices are of the points corrected; where
@@ -2320,16 +2322,18 @@ static void kowalevski_top_chain(kowalevski_top_lines line[1], double x[6], doub
     for (int k = 0; k < 1 * kowalevski_top_LANES; ++k) {
         const int lane = k / 1, after = (k + 1) / 1 % kowalevski_top_LANES;
         kowalevski_top_lines *at = &line[k % 1], *next = &line[(k + 1) % 1];
-        double correction[6] = { 0.0 };
+        double even[6] = { 0.0 }, odd[6] = { 0.0 }; /* two sums, so that no long chain of additions is waited for */
         for (int i = 0; i < 6; ++i) {
             at->residual[i][lane] = residual[i];
-            for (int j = 0; j < 6; ++j) correction[i] -= at->gain[i * 6 + j][lane] * residual[j];
+            for (int j = 0; j < 6; j += 2) even[i] += at->gain[i * 6 + j][lane] * residual[j];
+            for (int j = 1; j < 6; j += 2) odd[i] += at->gain[i * 6 + j][lane] * residual[j];
         }
         for (int i = 0; i < 6; ++i) {
             const double change = at->increment[i][lane], total = sum[i] + change, added = total - sum[i];
             const double turn = (next->displacement[i][after] - at->displacement[i][lane]) - change;
-            residual[i] = ((next->y[i][after] - at->y[i][lane]) + turn) + (residual[i] - correction[i]);
-            small[i] += ((sum[i] - (total - added)) + (change - added)) + correction[i];
+            const double moved = (next->y[i][after] - at->y[i][lane]) + turn;
+            residual[i] = ((moved + residual[i]) + odd[i]) + even[i];
+            small[i] += ((sum[i] - (total - added)) + (change - added)) - (even[i] + odd[i]);
             sum[i] = total;
         }
     }
@@ -2423,7 +2427,8 @@ static int kowalevski_top_block(kowalevski_top_solver *s, kowalevski_top_table *
         kowalevski_top_chain(line, x, carry);
         for (int stage = 0; stage < 1; ++stage) {
             kowalevski_top_correct(&line[stage], sizes);
-            size = fmax(size, kowalevski_top_largest(sizes));
+            const double largest = kowalevski_top_largest(sizes);
+            size = largest > size ? largest : size;
         }
         s->evaluations += 1 * kowalevski_top_LANES;
         bend = matrices ? 0.0 : bend + previous;
@@ -2608,10 +2613,12 @@ static void kowalevski_top_group_judge(kowalevski_top_group *group, int stage, k
     group->fitting[stage] = kowalevski_top_group_sum(group, row[0]) <= least;
 }
 
-/* Fit the recurrences of all members; with every time, wait longer before it is done again. */
+/* Fit the recurrences of all members; with every time, wait longer before it is done again, and for long if it did not
+   help. */
 static void kowalevski_top_group_fit(kowalevski_top_group *group)
 {
     kowalevski_top_memory memory;
+    const int helped = group->fits == 0 || group->fitting[0];
     memory.count = 96;
     for (int stage = 0; stage < 1; ++stage)
         for (int lane = 0; lane < kowalevski_top_LANES; ++lane) {
@@ -2626,7 +2633,7 @@ static void kowalevski_top_group_fit(kowalevski_top_group *group)
         }
     ++group->fits;
     group->slow = 0;
-    group->patience = group->patience < 10000 ? 2 * group->patience + 1000 : 20000;
+    group->patience = helped && group->patience < 10000 ? 2 * group->patience + 1000 : 100 * 1000;
 }
 
 /* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group.
@@ -2694,8 +2701,8 @@ static void kowalevski_top_group_advance(kowalevski_top_lanes x[restrict 6], kow
     }
 }
 
-/* One step of all members. One that fails keeps its state, and leaves. How many are left. */
-static int kowalevski_top_group_step(kowalevski_top_group *group)
+/* One step of all members, of as many as remain. One that fails keeps its state, and leaves. How many are left. */
+static int kowalevski_top_group_step(kowalevski_top_group *group, size_t remaining)
 {
     kowalevski_top_lanes x[6], carry[6];
     kowalevski_top_lines line;
@@ -2713,7 +2720,8 @@ static int kowalevski_top_group_step(kowalevski_top_group *group)
     group->latest = next;
     if (group->count < 96) ++group->count;
     group->slow = most > 1 ? group->slow + 1 : 0;
-    if (group->slow > group->patience && group->count == 96) kowalevski_top_group_fit(group);
+    if (group->slow > group->patience && group->count == 96 && remaining >= 4000)
+        kowalevski_top_group_fit(group);
     for (int lane = 0; lane < kowalevski_top_LANES; ++lane) {
         for (int i = 0; i < 6; ++i)
             if (!isfinite(group->x[i][lane])) group->active[lane] = 0;
@@ -2764,13 +2772,12 @@ static kowalevski_top_status kowalevski_top_group_run(const kowalevski_top_param
     const int count = members - first < kowalevski_top_LANES ? (int)(members - first) : kowalevski_top_LANES;
     double state[6];
     memset(&group, 0, sizeof group);
-    group.patience = 1000;
     for (int lane = 0; lane < count; ++lane) {
         for (size_t i = 0; i < 6; ++i) state[i] = x[i * members + first + (size_t)lane];
         group.left[lane] = steps;
         member[lane] = kowalevski_top_group_join(&group, lane, params, state, h);
     }
-    for (size_t k = 0; k < steps && kowalevski_top_group_step(&group) > 2; ++k) continue;
+    for (size_t k = 0; k < steps && kowalevski_top_group_step(&group, steps - k) > 2; ++k) continue;
     for (int lane = 0; lane < count; ++lane) {
         for (int i = 0; i < 6; ++i) state[i] = group.x[i][lane];
         if (member[lane] == kowalevski_top_OK) {

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 2ed19fdde383cbb0d4fb71e4c19f17e7273261b728a175104ebd86409bcd7c0f
+ * body-sha256: dc8f87515282c61fafbd2e54ae7d70390a72d9875eda0a095e9b539207fce4e3
  */
 #include "lotka_volterra.h"
 
@@ -229,11 +229,12 @@ static void lotka_volterra_train(lotka_volterra_memory *memory, int component)
     }
     for (int k = 0; k < WINDOW; ++k) q[ROWS + k][k] = 1e-13 * largest;
     for (int k = 0; k < WINDOW; ++k) {
-        for (int i = 0; i < ROWS + WINDOW; ++i)
+        const int rows = ROWS + k + 1; /* further rows of the ridge are still zero in this column */
+        for (int i = 0; i < rows; ++i)
             for (int j = k; j < WINDOW + AHEAD; ++j) r[k][j] += q[i][k] * q[i][j];
         const double scale = r[k][k] > 0.0 ? 1.0 / r[k][k] : 0.0;
         for (int j = k + 1; j < WINDOW + AHEAD; ++j) r[k][j] *= scale;
-        for (int i = 0; i < ROWS + WINDOW; ++i)
+        for (int i = 0; i < rows; ++i)
             for (int j = k + 1; j < WINDOW + AHEAD; ++j) q[i][j] -= q[i][k] * r[k][j];
     }
     for (int l = 0; l < AHEAD; ++l)
@@ -652,15 +653,16 @@ static void lotka_volterra_correct(lotka_volterra_lines *line, lotka_volterra_la
         for (int lane = 0; lane < lotka_volterra_LANES; ++lane) line->y[i][lane] -= delta[i][lane];
 }
 
-/* The largest size; infinite if one is not finite. */
+/* The largest size; infinite if one is not finite. As integers, the bits of numbers that are not negative have their
+   order, and those of what is no number are larger. */
 static double lotka_volterra_largest(const lotka_volterra_lanes size)
 {
-    double largest = 0.0, total = 0.0;
-    for (int lane = 0; lane < lotka_volterra_LANES; ++lane) {
-        total += size[lane];
-        largest = size[lane] > largest ? size[lane] : largest;
-    }
-    return isfinite(total) ? largest : HUGE_VAL;
+    uint64_t bits[8], most = 0;
+    double largest;
+    memcpy(bits, size, sizeof bits);
+    for (int lane = 0; lane < lotka_volterra_LANES; ++lane) most = bits[lane] > most ? bits[lane] : most;
+    memcpy(&largest, &most, sizeof largest);
+    return isfinite(largest) ? largest : HUGE_VAL;
 }
 
 /* What is left after a correction of this size: quadratic in it, where the matrices are of the points corrected; where
@@ -693,16 +695,18 @@ static void lotka_volterra_chain(lotka_volterra_lines line[1], double x[3], doub
     for (int k = 0; k < 1 * lotka_volterra_LANES; ++k) {
         const int lane = k / 1, after = (k + 1) / 1 % lotka_volterra_LANES;
         lotka_volterra_lines *at = &line[k % 1], *next = &line[(k + 1) % 1];
-        double correction[3] = { 0.0 };
+        double even[3] = { 0.0 }, odd[3] = { 0.0 }; /* two sums, so that no long chain of additions is waited for */
         for (int i = 0; i < 3; ++i) {
             at->residual[i][lane] = residual[i];
-            for (int j = 0; j < 3; ++j) correction[i] -= at->gain[i * 3 + j][lane] * residual[j];
+            for (int j = 0; j < 3; j += 2) even[i] += at->gain[i * 3 + j][lane] * residual[j];
+            for (int j = 1; j < 3; j += 2) odd[i] += at->gain[i * 3 + j][lane] * residual[j];
         }
         for (int i = 0; i < 3; ++i) {
             const double change = at->increment[i][lane], total = sum[i] + change, added = total - sum[i];
             const double turn = (next->displacement[i][after] - at->displacement[i][lane]) - change;
-            residual[i] = ((next->y[i][after] - at->y[i][lane]) + turn) + (residual[i] - correction[i]);
-            small[i] += ((sum[i] - (total - added)) + (change - added)) + correction[i];
+            const double moved = (next->y[i][after] - at->y[i][lane]) + turn;
+            residual[i] = ((moved + residual[i]) + odd[i]) + even[i];
+            small[i] += ((sum[i] - (total - added)) + (change - added)) - (even[i] + odd[i]);
             sum[i] = total;
         }
     }
@@ -796,7 +800,8 @@ static int lotka_volterra_block(lotka_volterra_solver *s, lotka_volterra_table *
         lotka_volterra_chain(line, x, carry);
         for (int stage = 0; stage < 1; ++stage) {
             lotka_volterra_correct(&line[stage], sizes);
-            size = fmax(size, lotka_volterra_largest(sizes));
+            const double largest = lotka_volterra_largest(sizes);
+            size = largest > size ? largest : size;
         }
         s->evaluations += 1 * lotka_volterra_LANES;
         bend = matrices ? 0.0 : bend + previous;
@@ -981,10 +986,12 @@ static void lotka_volterra_group_judge(lotka_volterra_group *group, int stage, l
     group->fitting[stage] = lotka_volterra_group_sum(group, row[0]) <= least;
 }
 
-/* Fit the recurrences of all members; with every time, wait longer before it is done again. */
+/* Fit the recurrences of all members; with every time, wait longer before it is done again, and for long if it did not
+   help. */
 static void lotka_volterra_group_fit(lotka_volterra_group *group)
 {
     lotka_volterra_memory memory;
+    const int helped = group->fits == 0 || group->fitting[0];
     memory.count = 96;
     for (int stage = 0; stage < 1; ++stage)
         for (int lane = 0; lane < lotka_volterra_LANES; ++lane) {
@@ -999,7 +1006,7 @@ static void lotka_volterra_group_fit(lotka_volterra_group *group)
         }
     ++group->fits;
     group->slow = 0;
-    group->patience = group->patience < 10000 ? 2 * group->patience + 1000 : 20000;
+    group->patience = helped && group->patience < 10000 ? 2 * group->patience + 1000 : 100 * 1000;
 }
 
 /* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group.
@@ -1067,8 +1074,8 @@ static void lotka_volterra_group_advance(lotka_volterra_lanes x[restrict 3], lot
     }
 }
 
-/* One step of all members. One that fails keeps its state, and leaves. How many are left. */
-static int lotka_volterra_group_step(lotka_volterra_group *group)
+/* One step of all members, of as many as remain. One that fails keeps its state, and leaves. How many are left. */
+static int lotka_volterra_group_step(lotka_volterra_group *group, size_t remaining)
 {
     lotka_volterra_lanes x[3], carry[3];
     lotka_volterra_lines line;
@@ -1086,7 +1093,8 @@ static int lotka_volterra_group_step(lotka_volterra_group *group)
     group->latest = next;
     if (group->count < 96) ++group->count;
     group->slow = most > 1 ? group->slow + 1 : 0;
-    if (group->slow > group->patience && group->count == 96) lotka_volterra_group_fit(group);
+    if (group->slow > group->patience && group->count == 96 && remaining >= 4000)
+        lotka_volterra_group_fit(group);
     for (int lane = 0; lane < lotka_volterra_LANES; ++lane) {
         for (int i = 0; i < 3; ++i)
             if (!isfinite(group->x[i][lane])) group->active[lane] = 0;
@@ -1137,13 +1145,12 @@ static lotka_volterra_status lotka_volterra_group_run(const lotka_volterra_param
     const int count = members - first < lotka_volterra_LANES ? (int)(members - first) : lotka_volterra_LANES;
     double state[3];
     memset(&group, 0, sizeof group);
-    group.patience = 1000;
     for (int lane = 0; lane < count; ++lane) {
         for (size_t i = 0; i < 3; ++i) state[i] = x[i * members + first + (size_t)lane];
         group.left[lane] = steps;
         member[lane] = lotka_volterra_group_join(&group, lane, params, state, h);
     }
-    for (size_t k = 0; k < steps && lotka_volterra_group_step(&group) > 2; ++k) continue;
+    for (size_t k = 0; k < steps && lotka_volterra_group_step(&group, steps - k) > 2; ++k) continue;
     for (int lane = 0; lane < count; ++lane) {
         for (int i = 0; i < 3; ++i) state[i] = group.x[i][lane];
         if (member[lane] == lotka_volterra_OK) {

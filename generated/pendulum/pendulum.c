@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: b07dc61d3681e0db69b1903ab7a095a9d89ab4ff73972bdcfd43df8cf1572660
+ * body-sha256: 6fdb16fd1d6ea4f990998b7375aceb3bd1afebdc69df646d17c37db76ad534c2
  */
 #include "pendulum.h"
 
@@ -223,11 +223,12 @@ static void pendulum_train(pendulum_memory *memory, int component)
     }
     for (int k = 0; k < WINDOW; ++k) q[ROWS + k][k] = 1e-13 * largest;
     for (int k = 0; k < WINDOW; ++k) {
-        for (int i = 0; i < ROWS + WINDOW; ++i)
+        const int rows = ROWS + k + 1; /* further rows of the ridge are still zero in this column */
+        for (int i = 0; i < rows; ++i)
             for (int j = k; j < WINDOW + AHEAD; ++j) r[k][j] += q[i][k] * q[i][j];
         const double scale = r[k][k] > 0.0 ? 1.0 / r[k][k] : 0.0;
         for (int j = k + 1; j < WINDOW + AHEAD; ++j) r[k][j] *= scale;
-        for (int i = 0; i < ROWS + WINDOW; ++i)
+        for (int i = 0; i < rows; ++i)
             for (int j = k + 1; j < WINDOW + AHEAD; ++j) q[i][j] -= q[i][k] * r[k][j];
     }
     for (int l = 0; l < AHEAD; ++l)
@@ -615,15 +616,16 @@ static void pendulum_correct(pendulum_lines *line, pendulum_lanes size)
         for (int lane = 0; lane < pendulum_LANES; ++lane) line->y[i][lane] -= delta[i][lane];
 }
 
-/* The largest size; infinite if one is not finite. */
+/* The largest size; infinite if one is not finite. As integers, the bits of numbers that are not negative have their
+   order, and those of what is no number are larger. */
 static double pendulum_largest(const pendulum_lanes size)
 {
-    double largest = 0.0, total = 0.0;
-    for (int lane = 0; lane < pendulum_LANES; ++lane) {
-        total += size[lane];
-        largest = size[lane] > largest ? size[lane] : largest;
-    }
-    return isfinite(total) ? largest : HUGE_VAL;
+    uint64_t bits[8], most = 0;
+    double largest;
+    memcpy(bits, size, sizeof bits);
+    for (int lane = 0; lane < pendulum_LANES; ++lane) most = bits[lane] > most ? bits[lane] : most;
+    memcpy(&largest, &most, sizeof largest);
+    return isfinite(largest) ? largest : HUGE_VAL;
 }
 
 /* What is left after a correction of this size: quadratic in it, where the matrices are of the points corrected; where
@@ -656,16 +658,18 @@ static void pendulum_chain(pendulum_lines line[1], double x[2], double carry[2])
     for (int k = 0; k < 1 * pendulum_LANES; ++k) {
         const int lane = k / 1, after = (k + 1) / 1 % pendulum_LANES;
         pendulum_lines *at = &line[k % 1], *next = &line[(k + 1) % 1];
-        double correction[2] = { 0.0 };
+        double even[2] = { 0.0 }, odd[2] = { 0.0 }; /* two sums, so that no long chain of additions is waited for */
         for (int i = 0; i < 2; ++i) {
             at->residual[i][lane] = residual[i];
-            for (int j = 0; j < 2; ++j) correction[i] -= at->gain[i * 2 + j][lane] * residual[j];
+            for (int j = 0; j < 2; j += 2) even[i] += at->gain[i * 2 + j][lane] * residual[j];
+            for (int j = 1; j < 2; j += 2) odd[i] += at->gain[i * 2 + j][lane] * residual[j];
         }
         for (int i = 0; i < 2; ++i) {
             const double change = at->increment[i][lane], total = sum[i] + change, added = total - sum[i];
             const double turn = (next->displacement[i][after] - at->displacement[i][lane]) - change;
-            residual[i] = ((next->y[i][after] - at->y[i][lane]) + turn) + (residual[i] - correction[i]);
-            small[i] += ((sum[i] - (total - added)) + (change - added)) + correction[i];
+            const double moved = (next->y[i][after] - at->y[i][lane]) + turn;
+            residual[i] = ((moved + residual[i]) + odd[i]) + even[i];
+            small[i] += ((sum[i] - (total - added)) + (change - added)) - (even[i] + odd[i]);
             sum[i] = total;
         }
     }
@@ -759,7 +763,8 @@ static int pendulum_block(pendulum_solver *s, pendulum_table *table, int most)
         pendulum_chain(line, x, carry);
         for (int stage = 0; stage < 1; ++stage) {
             pendulum_correct(&line[stage], sizes);
-            size = fmax(size, pendulum_largest(sizes));
+            const double largest = pendulum_largest(sizes);
+            size = largest > size ? largest : size;
         }
         s->evaluations += 1 * pendulum_LANES;
         bend = matrices ? 0.0 : bend + previous;
@@ -944,10 +949,12 @@ static void pendulum_group_judge(pendulum_group *group, int stage, pendulum_lane
     group->fitting[stage] = pendulum_group_sum(group, row[0]) <= least;
 }
 
-/* Fit the recurrences of all members; with every time, wait longer before it is done again. */
+/* Fit the recurrences of all members; with every time, wait longer before it is done again, and for long if it did not
+   help. */
 static void pendulum_group_fit(pendulum_group *group)
 {
     pendulum_memory memory;
+    const int helped = group->fits == 0 || group->fitting[0];
     memory.count = 96;
     for (int stage = 0; stage < 1; ++stage)
         for (int lane = 0; lane < pendulum_LANES; ++lane) {
@@ -962,7 +969,7 @@ static void pendulum_group_fit(pendulum_group *group)
         }
     ++group->fits;
     group->slow = 0;
-    group->patience = group->patience < 10000 ? 2 * group->patience + 1000 : 20000;
+    group->patience = helped && group->patience < 10000 ? 2 * group->patience + 1000 : 100 * 1000;
 }
 
 /* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group.
@@ -1030,8 +1037,8 @@ static void pendulum_group_advance(pendulum_lanes x[restrict 2], pendulum_lanes 
     }
 }
 
-/* One step of all members. One that fails keeps its state, and leaves. How many are left. */
-static int pendulum_group_step(pendulum_group *group)
+/* One step of all members, of as many as remain. One that fails keeps its state, and leaves. How many are left. */
+static int pendulum_group_step(pendulum_group *group, size_t remaining)
 {
     pendulum_lanes x[2], carry[2];
     pendulum_lines line;
@@ -1049,7 +1056,8 @@ static int pendulum_group_step(pendulum_group *group)
     group->latest = next;
     if (group->count < 96) ++group->count;
     group->slow = most > 1 ? group->slow + 1 : 0;
-    if (group->slow > group->patience && group->count == 96) pendulum_group_fit(group);
+    if (group->slow > group->patience && group->count == 96 && remaining >= 4000)
+        pendulum_group_fit(group);
     for (int lane = 0; lane < pendulum_LANES; ++lane) {
         for (int i = 0; i < 2; ++i)
             if (!isfinite(group->x[i][lane])) group->active[lane] = 0;
@@ -1100,13 +1108,12 @@ static pendulum_status pendulum_group_run(const pendulum_params *params, double 
     const int count = members - first < pendulum_LANES ? (int)(members - first) : pendulum_LANES;
     double state[2];
     memset(&group, 0, sizeof group);
-    group.patience = 1000;
     for (int lane = 0; lane < count; ++lane) {
         for (size_t i = 0; i < 2; ++i) state[i] = x[i * members + first + (size_t)lane];
         group.left[lane] = steps;
         member[lane] = pendulum_group_join(&group, lane, params, state, h);
     }
-    for (size_t k = 0; k < steps && pendulum_group_step(&group) > 2; ++k) continue;
+    for (size_t k = 0; k < steps && pendulum_group_step(&group, steps - k) > 2; ++k) continue;
     for (int lane = 0; lane < count; ++lane) {
         for (int i = 0; i < 2; ++i) state[i] = group.x[i][lane];
         if (member[lane] == pendulum_OK) {

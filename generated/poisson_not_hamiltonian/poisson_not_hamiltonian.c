@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: a75dd875c88c29cab1da1c0b0d178f2d75e6f2f39b959854ab599b62f522900d
+ * body-sha256: 9b2ecbed809e466182bddc55e9e34f51a80a159456398a4380e8c65174f27249
  */
 #include "poisson_not_hamiltonian.h"
 
@@ -326,11 +326,12 @@ static void poisson_not_hamiltonian_train(poisson_not_hamiltonian_memory *memory
     }
     for (int k = 0; k < WINDOW; ++k) q[ROWS + k][k] = 1e-13 * largest;
     for (int k = 0; k < WINDOW; ++k) {
-        for (int i = 0; i < ROWS + WINDOW; ++i)
+        const int rows = ROWS + k + 1; /* further rows of the ridge are still zero in this column */
+        for (int i = 0; i < rows; ++i)
             for (int j = k; j < WINDOW + AHEAD; ++j) r[k][j] += q[i][k] * q[i][j];
         const double scale = r[k][k] > 0.0 ? 1.0 / r[k][k] : 0.0;
         for (int j = k + 1; j < WINDOW + AHEAD; ++j) r[k][j] *= scale;
-        for (int i = 0; i < ROWS + WINDOW; ++i)
+        for (int i = 0; i < rows; ++i)
             for (int j = k + 1; j < WINDOW + AHEAD; ++j) q[i][j] -= q[i][k] * r[k][j];
     }
     for (int l = 0; l < AHEAD; ++l)
@@ -916,15 +917,16 @@ static void poisson_not_hamiltonian_correct(poisson_not_hamiltonian_lines *line,
         for (int lane = 0; lane < poisson_not_hamiltonian_LANES; ++lane) line->y[i][lane] -= delta[i][lane];
 }
 
-/* The largest size; infinite if one is not finite. */
+/* The largest size; infinite if one is not finite. As integers, the bits of numbers that are not negative have their
+   order, and those of what is no number are larger. */
 static double poisson_not_hamiltonian_largest(const poisson_not_hamiltonian_lanes size)
 {
-    double largest = 0.0, total = 0.0;
-    for (int lane = 0; lane < poisson_not_hamiltonian_LANES; ++lane) {
-        total += size[lane];
-        largest = size[lane] > largest ? size[lane] : largest;
-    }
-    return isfinite(total) ? largest : HUGE_VAL;
+    uint64_t bits[8], most = 0;
+    double largest;
+    memcpy(bits, size, sizeof bits);
+    for (int lane = 0; lane < poisson_not_hamiltonian_LANES; ++lane) most = bits[lane] > most ? bits[lane] : most;
+    memcpy(&largest, &most, sizeof largest);
+    return isfinite(largest) ? largest : HUGE_VAL;
 }
 
 /* What is left after a correction of this size: quadratic in it, where the matrices are of the points corrected; where
@@ -957,16 +959,18 @@ static void poisson_not_hamiltonian_chain(poisson_not_hamiltonian_lines line[1],
     for (int k = 0; k < 1 * poisson_not_hamiltonian_LANES; ++k) {
         const int lane = k / 1, after = (k + 1) / 1 % poisson_not_hamiltonian_LANES;
         poisson_not_hamiltonian_lines *at = &line[k % 1], *next = &line[(k + 1) % 1];
-        double correction[3] = { 0.0 };
+        double even[3] = { 0.0 }, odd[3] = { 0.0 }; /* two sums, so that no long chain of additions is waited for */
         for (int i = 0; i < 3; ++i) {
             at->residual[i][lane] = residual[i];
-            for (int j = 0; j < 3; ++j) correction[i] -= at->gain[i * 3 + j][lane] * residual[j];
+            for (int j = 0; j < 3; j += 2) even[i] += at->gain[i * 3 + j][lane] * residual[j];
+            for (int j = 1; j < 3; j += 2) odd[i] += at->gain[i * 3 + j][lane] * residual[j];
         }
         for (int i = 0; i < 3; ++i) {
             const double change = at->increment[i][lane], total = sum[i] + change, added = total - sum[i];
             const double turn = (next->displacement[i][after] - at->displacement[i][lane]) - change;
-            residual[i] = ((next->y[i][after] - at->y[i][lane]) + turn) + (residual[i] - correction[i]);
-            small[i] += ((sum[i] - (total - added)) + (change - added)) + correction[i];
+            const double moved = (next->y[i][after] - at->y[i][lane]) + turn;
+            residual[i] = ((moved + residual[i]) + odd[i]) + even[i];
+            small[i] += ((sum[i] - (total - added)) + (change - added)) - (even[i] + odd[i]);
             sum[i] = total;
         }
     }
@@ -1060,7 +1064,8 @@ static int poisson_not_hamiltonian_block(poisson_not_hamiltonian_solver *s, pois
         poisson_not_hamiltonian_chain(line, x, carry);
         for (int stage = 0; stage < 1; ++stage) {
             poisson_not_hamiltonian_correct(&line[stage], sizes);
-            size = fmax(size, poisson_not_hamiltonian_largest(sizes));
+            const double largest = poisson_not_hamiltonian_largest(sizes);
+            size = largest > size ? largest : size;
         }
         s->evaluations += 1 * poisson_not_hamiltonian_LANES;
         bend = matrices ? 0.0 : bend + previous;
@@ -1245,10 +1250,12 @@ static void poisson_not_hamiltonian_group_judge(poisson_not_hamiltonian_group *g
     group->fitting[stage] = poisson_not_hamiltonian_group_sum(group, row[0]) <= least;
 }
 
-/* Fit the recurrences of all members; with every time, wait longer before it is done again. */
+/* Fit the recurrences of all members; with every time, wait longer before it is done again, and for long if it did not
+   help. */
 static void poisson_not_hamiltonian_group_fit(poisson_not_hamiltonian_group *group)
 {
     poisson_not_hamiltonian_memory memory;
+    const int helped = group->fits == 0 || group->fitting[0];
     memory.count = 96;
     for (int stage = 0; stage < 1; ++stage)
         for (int lane = 0; lane < poisson_not_hamiltonian_LANES; ++lane) {
@@ -1263,7 +1270,7 @@ static void poisson_not_hamiltonian_group_fit(poisson_not_hamiltonian_group *gro
         }
     ++group->fits;
     group->slow = 0;
-    group->patience = group->patience < 10000 ? 2 * group->patience + 1000 : 20000;
+    group->patience = helped && group->patience < 10000 ? 2 * group->patience + 1000 : 100 * 1000;
 }
 
 /* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group.
@@ -1331,8 +1338,8 @@ static void poisson_not_hamiltonian_group_advance(poisson_not_hamiltonian_lanes 
     }
 }
 
-/* One step of all members. One that fails keeps its state, and leaves. How many are left. */
-static int poisson_not_hamiltonian_group_step(poisson_not_hamiltonian_group *group)
+/* One step of all members, of as many as remain. One that fails keeps its state, and leaves. How many are left. */
+static int poisson_not_hamiltonian_group_step(poisson_not_hamiltonian_group *group, size_t remaining)
 {
     poisson_not_hamiltonian_lanes x[3], carry[3];
     poisson_not_hamiltonian_lines line;
@@ -1350,7 +1357,8 @@ static int poisson_not_hamiltonian_group_step(poisson_not_hamiltonian_group *gro
     group->latest = next;
     if (group->count < 96) ++group->count;
     group->slow = most > 1 ? group->slow + 1 : 0;
-    if (group->slow > group->patience && group->count == 96) poisson_not_hamiltonian_group_fit(group);
+    if (group->slow > group->patience && group->count == 96 && remaining >= 4000)
+        poisson_not_hamiltonian_group_fit(group);
     for (int lane = 0; lane < poisson_not_hamiltonian_LANES; ++lane) {
         for (int i = 0; i < 3; ++i)
             if (!isfinite(group->x[i][lane])) group->active[lane] = 0;
@@ -1401,13 +1409,12 @@ static poisson_not_hamiltonian_status poisson_not_hamiltonian_group_run(const po
     const int count = members - first < poisson_not_hamiltonian_LANES ? (int)(members - first) : poisson_not_hamiltonian_LANES;
     double state[3];
     memset(&group, 0, sizeof group);
-    group.patience = 1000;
     for (int lane = 0; lane < count; ++lane) {
         for (size_t i = 0; i < 3; ++i) state[i] = x[i * members + first + (size_t)lane];
         group.left[lane] = steps;
         member[lane] = poisson_not_hamiltonian_group_join(&group, lane, params, state, h);
     }
-    for (size_t k = 0; k < steps && poisson_not_hamiltonian_group_step(&group) > 2; ++k) continue;
+    for (size_t k = 0; k < steps && poisson_not_hamiltonian_group_step(&group, steps - k) > 2; ++k) continue;
     for (int lane = 0; lane < count; ++lane) {
         for (int i = 0; i < 3; ++i) state[i] = group.x[i][lane];
         if (member[lane] == poisson_not_hamiltonian_OK) {

@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 0a3599d8a2c46030ff180616720e283468fc6e7336bad9baf388fbf54f57564a
+ * body-sha256: 9a5dd740e2d3074135ef68fb8de568ee497e7d4a6906d4a3ba1d8fd6ff952277
  */
 #include "so4_manakov.h"
 
@@ -798,11 +798,12 @@ static void so4_manakov_train(so4_manakov_memory *memory, int component)
     }
     for (int k = 0; k < WINDOW; ++k) q[ROWS + k][k] = 1e-13 * largest;
     for (int k = 0; k < WINDOW; ++k) {
-        for (int i = 0; i < ROWS + WINDOW; ++i)
+        const int rows = ROWS + k + 1; /* further rows of the ridge are still zero in this column */
+        for (int i = 0; i < rows; ++i)
             for (int j = k; j < WINDOW + AHEAD; ++j) r[k][j] += q[i][k] * q[i][j];
         const double scale = r[k][k] > 0.0 ? 1.0 / r[k][k] : 0.0;
         for (int j = k + 1; j < WINDOW + AHEAD; ++j) r[k][j] *= scale;
-        for (int i = 0; i < ROWS + WINDOW; ++i)
+        for (int i = 0; i < rows; ++i)
             for (int j = k + 1; j < WINDOW + AHEAD; ++j) q[i][j] -= q[i][k] * r[k][j];
     }
     for (int l = 0; l < AHEAD; ++l)
@@ -1915,15 +1916,16 @@ static void so4_manakov_correct(so4_manakov_lines *line, so4_manakov_lanes size)
         for (int lane = 0; lane < so4_manakov_LANES; ++lane) line->y[i][lane] -= delta[i][lane];
 }
 
-/* The largest size; infinite if one is not finite. */
+/* The largest size; infinite if one is not finite. As integers, the bits of numbers that are not negative have their
+   order, and those of what is no number are larger. */
 static double so4_manakov_largest(const so4_manakov_lanes size)
 {
-    double largest = 0.0, total = 0.0;
-    for (int lane = 0; lane < so4_manakov_LANES; ++lane) {
-        total += size[lane];
-        largest = size[lane] > largest ? size[lane] : largest;
-    }
-    return isfinite(total) ? largest : HUGE_VAL;
+    uint64_t bits[8], most = 0;
+    double largest;
+    memcpy(bits, size, sizeof bits);
+    for (int lane = 0; lane < so4_manakov_LANES; ++lane) most = bits[lane] > most ? bits[lane] : most;
+    memcpy(&largest, &most, sizeof largest);
+    return isfinite(largest) ? largest : HUGE_VAL;
 }
 
 /* What is left after a correction of this size: quadratic in it, where the matrices are of the points corrected; where
@@ -1956,16 +1958,18 @@ static void so4_manakov_chain(so4_manakov_lines line[1], double x[6], double car
     for (int k = 0; k < 1 * so4_manakov_LANES; ++k) {
         const int lane = k / 1, after = (k + 1) / 1 % so4_manakov_LANES;
         so4_manakov_lines *at = &line[k % 1], *next = &line[(k + 1) % 1];
-        double correction[6] = { 0.0 };
+        double even[6] = { 0.0 }, odd[6] = { 0.0 }; /* two sums, so that no long chain of additions is waited for */
         for (int i = 0; i < 6; ++i) {
             at->residual[i][lane] = residual[i];
-            for (int j = 0; j < 6; ++j) correction[i] -= at->gain[i * 6 + j][lane] * residual[j];
+            for (int j = 0; j < 6; j += 2) even[i] += at->gain[i * 6 + j][lane] * residual[j];
+            for (int j = 1; j < 6; j += 2) odd[i] += at->gain[i * 6 + j][lane] * residual[j];
         }
         for (int i = 0; i < 6; ++i) {
             const double change = at->increment[i][lane], total = sum[i] + change, added = total - sum[i];
             const double turn = (next->displacement[i][after] - at->displacement[i][lane]) - change;
-            residual[i] = ((next->y[i][after] - at->y[i][lane]) + turn) + (residual[i] - correction[i]);
-            small[i] += ((sum[i] - (total - added)) + (change - added)) + correction[i];
+            const double moved = (next->y[i][after] - at->y[i][lane]) + turn;
+            residual[i] = ((moved + residual[i]) + odd[i]) + even[i];
+            small[i] += ((sum[i] - (total - added)) + (change - added)) - (even[i] + odd[i]);
             sum[i] = total;
         }
     }
@@ -2059,7 +2063,8 @@ static int so4_manakov_block(so4_manakov_solver *s, so4_manakov_table *table, in
         so4_manakov_chain(line, x, carry);
         for (int stage = 0; stage < 1; ++stage) {
             so4_manakov_correct(&line[stage], sizes);
-            size = fmax(size, so4_manakov_largest(sizes));
+            const double largest = so4_manakov_largest(sizes);
+            size = largest > size ? largest : size;
         }
         s->evaluations += 1 * so4_manakov_LANES;
         bend = matrices ? 0.0 : bend + previous;
@@ -2245,10 +2250,12 @@ static void so4_manakov_group_judge(so4_manakov_group *group, int stage, so4_man
     group->fitting[stage] = so4_manakov_group_sum(group, row[0]) <= least;
 }
 
-/* Fit the recurrences of all members; with every time, wait longer before it is done again. */
+/* Fit the recurrences of all members; with every time, wait longer before it is done again, and for long if it did not
+   help. */
 static void so4_manakov_group_fit(so4_manakov_group *group)
 {
     so4_manakov_memory memory;
+    const int helped = group->fits == 0 || group->fitting[0];
     memory.count = 96;
     for (int stage = 0; stage < 1; ++stage)
         for (int lane = 0; lane < so4_manakov_LANES; ++lane) {
@@ -2263,7 +2270,7 @@ static void so4_manakov_group_fit(so4_manakov_group *group)
         }
     ++group->fits;
     group->slow = 0;
-    group->patience = group->patience < 10000 ? 2 * group->patience + 1000 : 20000;
+    group->patience = helped && group->patience < 10000 ? 2 * group->patience + 1000 : 100 * 1000;
 }
 
 /* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group.
@@ -2331,8 +2338,8 @@ static void so4_manakov_group_advance(so4_manakov_lanes x[restrict 6], so4_manak
     }
 }
 
-/* One step of all members. One that fails keeps its state, and leaves. How many are left. */
-static int so4_manakov_group_step(so4_manakov_group *group)
+/* One step of all members, of as many as remain. One that fails keeps its state, and leaves. How many are left. */
+static int so4_manakov_group_step(so4_manakov_group *group, size_t remaining)
 {
     so4_manakov_lanes x[6], carry[6];
     so4_manakov_lines line;
@@ -2350,7 +2357,8 @@ static int so4_manakov_group_step(so4_manakov_group *group)
     group->latest = next;
     if (group->count < 96) ++group->count;
     group->slow = most > 1 ? group->slow + 1 : 0;
-    if (group->slow > group->patience && group->count == 96) so4_manakov_group_fit(group);
+    if (group->slow > group->patience && group->count == 96 && remaining >= 4000)
+        so4_manakov_group_fit(group);
     for (int lane = 0; lane < so4_manakov_LANES; ++lane) {
         for (int i = 0; i < 6; ++i)
             if (!isfinite(group->x[i][lane])) group->active[lane] = 0;
@@ -2402,13 +2410,12 @@ static so4_manakov_status so4_manakov_group_run(const so4_manakov_params *params
     const int count = members - first < so4_manakov_LANES ? (int)(members - first) : so4_manakov_LANES;
     double state[6];
     memset(&group, 0, sizeof group);
-    group.patience = 1000;
     for (int lane = 0; lane < count; ++lane) {
         for (size_t i = 0; i < 6; ++i) state[i] = x[i * members + first + (size_t)lane];
         group.left[lane] = steps;
         member[lane] = so4_manakov_group_join(&group, lane, params, state, h);
     }
-    for (size_t k = 0; k < steps && so4_manakov_group_step(&group) > 2; ++k) continue;
+    for (size_t k = 0; k < steps && so4_manakov_group_step(&group, steps - k) > 2; ++k) continue;
     for (int lane = 0; lane < count; ++lane) {
         for (int i = 0; i < 6; ++i) state[i] = group.x[i][lane];
         if (member[lane] == so4_manakov_OK) {

@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 4a69a34ed3e29dab5fcbf080e1d76a6a050541f493db2f7007c2d1566e293ffe
+ * body-sha256: 6a5af8e86a3e4dcc3eb985884157ae69e13c703072562db2b7cbc1da3e453930
  */
 #include "spin_chain5.h"
 
@@ -1776,11 +1776,12 @@ static void spin_chain5_train(spin_chain5_memory *memory, int component)
     }
     for (int k = 0; k < WINDOW; ++k) q[ROWS + k][k] = 1e-13 * largest;
     for (int k = 0; k < WINDOW; ++k) {
-        for (int i = 0; i < ROWS + WINDOW; ++i)
+        const int rows = ROWS + k + 1; /* further rows of the ridge are still zero in this column */
+        for (int i = 0; i < rows; ++i)
             for (int j = k; j < WINDOW + AHEAD; ++j) r[k][j] += q[i][k] * q[i][j];
         const double scale = r[k][k] > 0.0 ? 1.0 / r[k][k] : 0.0;
         for (int j = k + 1; j < WINDOW + AHEAD; ++j) r[k][j] *= scale;
-        for (int i = 0; i < ROWS + WINDOW; ++i)
+        for (int i = 0; i < rows; ++i)
             for (int j = k + 1; j < WINDOW + AHEAD; ++j) q[i][j] -= q[i][k] * r[k][j];
     }
     for (int l = 0; l < AHEAD; ++l)
@@ -4535,15 +4536,16 @@ static void spin_chain5_correct(spin_chain5_lines *line, spin_chain5_lanes size)
         for (int lane = 0; lane < spin_chain5_LANES; ++lane) line->y[i][lane] -= delta[i][lane];
 }
 
-/* The largest size; infinite if one is not finite. */
+/* The largest size; infinite if one is not finite. As integers, the bits of numbers that are not negative have their
+   order, and those of what is no number are larger. */
 static double spin_chain5_largest(const spin_chain5_lanes size)
 {
-    double largest = 0.0, total = 0.0;
-    for (int lane = 0; lane < spin_chain5_LANES; ++lane) {
-        total += size[lane];
-        largest = size[lane] > largest ? size[lane] : largest;
-    }
-    return isfinite(total) ? largest : HUGE_VAL;
+    uint64_t bits[8], most = 0;
+    double largest;
+    memcpy(bits, size, sizeof bits);
+    for (int lane = 0; lane < spin_chain5_LANES; ++lane) most = bits[lane] > most ? bits[lane] : most;
+    memcpy(&largest, &most, sizeof largest);
+    return isfinite(largest) ? largest : HUGE_VAL;
 }
 
 /* What is left after a correction of this size: quadratic in it, where the matrices are of the points corrected; where
@@ -4576,16 +4578,18 @@ static void spin_chain5_chain(spin_chain5_lines line[1], double x[15], double ca
     for (int k = 0; k < 1 * spin_chain5_LANES; ++k) {
         const int lane = k / 1, after = (k + 1) / 1 % spin_chain5_LANES;
         spin_chain5_lines *at = &line[k % 1], *next = &line[(k + 1) % 1];
-        double correction[15] = { 0.0 };
+        double even[15] = { 0.0 }, odd[15] = { 0.0 }; /* two sums, so that no long chain of additions is waited for */
         for (int i = 0; i < 15; ++i) {
             at->residual[i][lane] = residual[i];
-            for (int j = 0; j < 15; ++j) correction[i] -= at->gain[i * 15 + j][lane] * residual[j];
+            for (int j = 0; j < 15; j += 2) even[i] += at->gain[i * 15 + j][lane] * residual[j];
+            for (int j = 1; j < 15; j += 2) odd[i] += at->gain[i * 15 + j][lane] * residual[j];
         }
         for (int i = 0; i < 15; ++i) {
             const double change = at->increment[i][lane], total = sum[i] + change, added = total - sum[i];
             const double turn = (next->displacement[i][after] - at->displacement[i][lane]) - change;
-            residual[i] = ((next->y[i][after] - at->y[i][lane]) + turn) + (residual[i] - correction[i]);
-            small[i] += ((sum[i] - (total - added)) + (change - added)) + correction[i];
+            const double moved = (next->y[i][after] - at->y[i][lane]) + turn;
+            residual[i] = ((moved + residual[i]) + odd[i]) + even[i];
+            small[i] += ((sum[i] - (total - added)) + (change - added)) - (even[i] + odd[i]);
             sum[i] = total;
         }
     }
@@ -4679,7 +4683,8 @@ static int spin_chain5_block(spin_chain5_solver *s, spin_chain5_table *table, in
         spin_chain5_chain(line, x, carry);
         for (int stage = 0; stage < 1; ++stage) {
             spin_chain5_correct(&line[stage], sizes);
-            size = fmax(size, spin_chain5_largest(sizes));
+            const double largest = spin_chain5_largest(sizes);
+            size = largest > size ? largest : size;
         }
         s->evaluations += 1 * spin_chain5_LANES;
         bend = matrices ? 0.0 : bend + previous;
@@ -4865,10 +4870,12 @@ static void spin_chain5_group_judge(spin_chain5_group *group, int stage, spin_ch
     group->fitting[stage] = spin_chain5_group_sum(group, row[0]) <= least;
 }
 
-/* Fit the recurrences of all members; with every time, wait longer before it is done again. */
+/* Fit the recurrences of all members; with every time, wait longer before it is done again, and for long if it did not
+   help. */
 static void spin_chain5_group_fit(spin_chain5_group *group)
 {
     spin_chain5_memory memory;
+    const int helped = group->fits == 0 || group->fitting[0];
     memory.count = 96;
     for (int stage = 0; stage < 1; ++stage)
         for (int lane = 0; lane < spin_chain5_LANES; ++lane) {
@@ -4883,7 +4890,7 @@ static void spin_chain5_group_fit(spin_chain5_group *group)
         }
     ++group->fits;
     group->slow = 0;
-    group->patience = group->patience < 10000 ? 2 * group->patience + 1000 : 20000;
+    group->patience = helped && group->patience < 10000 ? 2 * group->patience + 1000 : 100 * 1000;
 }
 
 /* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group.
@@ -4951,8 +4958,8 @@ static void spin_chain5_group_advance(spin_chain5_lanes x[restrict 15], spin_cha
     }
 }
 
-/* One step of all members. One that fails keeps its state, and leaves. How many are left. */
-static int spin_chain5_group_step(spin_chain5_group *group)
+/* One step of all members, of as many as remain. One that fails keeps its state, and leaves. How many are left. */
+static int spin_chain5_group_step(spin_chain5_group *group, size_t remaining)
 {
     spin_chain5_lanes x[15], carry[15];
     spin_chain5_lines line;
@@ -4970,7 +4977,8 @@ static int spin_chain5_group_step(spin_chain5_group *group)
     group->latest = next;
     if (group->count < 96) ++group->count;
     group->slow = most > 1 ? group->slow + 1 : 0;
-    if (group->slow > group->patience && group->count == 96) spin_chain5_group_fit(group);
+    if (group->slow > group->patience && group->count == 96 && remaining >= 4000)
+        spin_chain5_group_fit(group);
     for (int lane = 0; lane < spin_chain5_LANES; ++lane) {
         for (int i = 0; i < 15; ++i)
             if (!isfinite(group->x[i][lane])) group->active[lane] = 0;
@@ -5022,13 +5030,12 @@ static spin_chain5_status spin_chain5_group_run(const spin_chain5_params *params
     const int count = members - first < spin_chain5_LANES ? (int)(members - first) : spin_chain5_LANES;
     double state[15];
     memset(&group, 0, sizeof group);
-    group.patience = 1000;
     for (int lane = 0; lane < count; ++lane) {
         for (size_t i = 0; i < 15; ++i) state[i] = x[i * members + first + (size_t)lane];
         group.left[lane] = steps;
         member[lane] = spin_chain5_group_join(&group, lane, params, state, h);
     }
-    for (size_t k = 0; k < steps && spin_chain5_group_step(&group) > 2; ++k) continue;
+    for (size_t k = 0; k < steps && spin_chain5_group_step(&group, steps - k) > 2; ++k) continue;
     for (int lane = 0; lane < count; ++lane) {
         for (int i = 0; i < 15; ++i) state[i] = group.x[i][lane];
         if (member[lane] == spin_chain5_OK) {

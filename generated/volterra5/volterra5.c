@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 664542bf26291dd41ecac6b02c826d801762e222bd3b1fcb358a053b6838aa1c
+ * body-sha256: 38fcf9a52542d60fc754ac5c56623af7df09434640864166a67e38493832c443
  */
 #include "volterra5.h"
 
@@ -319,11 +319,12 @@ static void volterra5_train(volterra5_memory *memory, int component)
     }
     for (int k = 0; k < WINDOW; ++k) q[ROWS + k][k] = 1e-13 * largest;
     for (int k = 0; k < WINDOW; ++k) {
-        for (int i = 0; i < ROWS + WINDOW; ++i)
+        const int rows = ROWS + k + 1; /* further rows of the ridge are still zero in this column */
+        for (int i = 0; i < rows; ++i)
             for (int j = k; j < WINDOW + AHEAD; ++j) r[k][j] += q[i][k] * q[i][j];
         const double scale = r[k][k] > 0.0 ? 1.0 / r[k][k] : 0.0;
         for (int j = k + 1; j < WINDOW + AHEAD; ++j) r[k][j] *= scale;
-        for (int i = 0; i < ROWS + WINDOW; ++i)
+        for (int i = 0; i < rows; ++i)
             for (int j = k + 1; j < WINDOW + AHEAD; ++j) q[i][j] -= q[i][k] * r[k][j];
     }
     for (int l = 0; l < AHEAD; ++l)
@@ -874,15 +875,16 @@ static void volterra5_correct(volterra5_lines *line, volterra5_lanes size)
         for (int lane = 0; lane < volterra5_LANES; ++lane) line->y[i][lane] -= delta[i][lane];
 }
 
-/* The largest size; infinite if one is not finite. */
+/* The largest size; infinite if one is not finite. As integers, the bits of numbers that are not negative have their
+   order, and those of what is no number are larger. */
 static double volterra5_largest(const volterra5_lanes size)
 {
-    double largest = 0.0, total = 0.0;
-    for (int lane = 0; lane < volterra5_LANES; ++lane) {
-        total += size[lane];
-        largest = size[lane] > largest ? size[lane] : largest;
-    }
-    return isfinite(total) ? largest : HUGE_VAL;
+    uint64_t bits[8], most = 0;
+    double largest;
+    memcpy(bits, size, sizeof bits);
+    for (int lane = 0; lane < volterra5_LANES; ++lane) most = bits[lane] > most ? bits[lane] : most;
+    memcpy(&largest, &most, sizeof largest);
+    return isfinite(largest) ? largest : HUGE_VAL;
 }
 
 /* What is left after a correction of this size: quadratic in it, where the matrices are of the points corrected; where
@@ -915,16 +917,18 @@ static void volterra5_chain(volterra5_lines line[1], double x[5], double carry[5
     for (int k = 0; k < 1 * volterra5_LANES; ++k) {
         const int lane = k / 1, after = (k + 1) / 1 % volterra5_LANES;
         volterra5_lines *at = &line[k % 1], *next = &line[(k + 1) % 1];
-        double correction[5] = { 0.0 };
+        double even[5] = { 0.0 }, odd[5] = { 0.0 }; /* two sums, so that no long chain of additions is waited for */
         for (int i = 0; i < 5; ++i) {
             at->residual[i][lane] = residual[i];
-            for (int j = 0; j < 5; ++j) correction[i] -= at->gain[i * 5 + j][lane] * residual[j];
+            for (int j = 0; j < 5; j += 2) even[i] += at->gain[i * 5 + j][lane] * residual[j];
+            for (int j = 1; j < 5; j += 2) odd[i] += at->gain[i * 5 + j][lane] * residual[j];
         }
         for (int i = 0; i < 5; ++i) {
             const double change = at->increment[i][lane], total = sum[i] + change, added = total - sum[i];
             const double turn = (next->displacement[i][after] - at->displacement[i][lane]) - change;
-            residual[i] = ((next->y[i][after] - at->y[i][lane]) + turn) + (residual[i] - correction[i]);
-            small[i] += ((sum[i] - (total - added)) + (change - added)) + correction[i];
+            const double moved = (next->y[i][after] - at->y[i][lane]) + turn;
+            residual[i] = ((moved + residual[i]) + odd[i]) + even[i];
+            small[i] += ((sum[i] - (total - added)) + (change - added)) - (even[i] + odd[i]);
             sum[i] = total;
         }
     }
@@ -1018,7 +1022,8 @@ static int volterra5_block(volterra5_solver *s, volterra5_table *table, int most
         volterra5_chain(line, x, carry);
         for (int stage = 0; stage < 1; ++stage) {
             volterra5_correct(&line[stage], sizes);
-            size = fmax(size, volterra5_largest(sizes));
+            const double largest = volterra5_largest(sizes);
+            size = largest > size ? largest : size;
         }
         s->evaluations += 1 * volterra5_LANES;
         bend = matrices ? 0.0 : bend + previous;
@@ -1203,10 +1208,12 @@ static void volterra5_group_judge(volterra5_group *group, int stage, volterra5_l
     group->fitting[stage] = volterra5_group_sum(group, row[0]) <= least;
 }
 
-/* Fit the recurrences of all members; with every time, wait longer before it is done again. */
+/* Fit the recurrences of all members; with every time, wait longer before it is done again, and for long if it did not
+   help. */
 static void volterra5_group_fit(volterra5_group *group)
 {
     volterra5_memory memory;
+    const int helped = group->fits == 0 || group->fitting[0];
     memory.count = 96;
     for (int stage = 0; stage < 1; ++stage)
         for (int lane = 0; lane < volterra5_LANES; ++lane) {
@@ -1221,7 +1228,7 @@ static void volterra5_group_fit(volterra5_group *group)
         }
     ++group->fits;
     group->slow = 0;
-    group->patience = group->patience < 10000 ? 2 * group->patience + 1000 : 20000;
+    group->patience = helped && group->patience < 10000 ? 2 * group->patience + 1000 : 100 * 1000;
 }
 
 /* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group.
@@ -1289,8 +1296,8 @@ static void volterra5_group_advance(volterra5_lanes x[restrict 5], volterra5_lan
     }
 }
 
-/* One step of all members. One that fails keeps its state, and leaves. How many are left. */
-static int volterra5_group_step(volterra5_group *group)
+/* One step of all members, of as many as remain. One that fails keeps its state, and leaves. How many are left. */
+static int volterra5_group_step(volterra5_group *group, size_t remaining)
 {
     volterra5_lanes x[5], carry[5];
     volterra5_lines line;
@@ -1308,7 +1315,8 @@ static int volterra5_group_step(volterra5_group *group)
     group->latest = next;
     if (group->count < 96) ++group->count;
     group->slow = most > 1 ? group->slow + 1 : 0;
-    if (group->slow > group->patience && group->count == 96) volterra5_group_fit(group);
+    if (group->slow > group->patience && group->count == 96 && remaining >= 4000)
+        volterra5_group_fit(group);
     for (int lane = 0; lane < volterra5_LANES; ++lane) {
         for (int i = 0; i < 5; ++i)
             if (!isfinite(group->x[i][lane])) group->active[lane] = 0;
@@ -1359,13 +1367,12 @@ static volterra5_status volterra5_group_run(const volterra5_params *params, doub
     const int count = members - first < volterra5_LANES ? (int)(members - first) : volterra5_LANES;
     double state[5];
     memset(&group, 0, sizeof group);
-    group.patience = 1000;
     for (int lane = 0; lane < count; ++lane) {
         for (size_t i = 0; i < 5; ++i) state[i] = x[i * members + first + (size_t)lane];
         group.left[lane] = steps;
         member[lane] = volterra5_group_join(&group, lane, params, state, h);
     }
-    for (size_t k = 0; k < steps && volterra5_group_step(&group) > 2; ++k) continue;
+    for (size_t k = 0; k < steps && volterra5_group_step(&group, steps - k) > 2; ++k) continue;
     for (int lane = 0; lane < count; ++lane) {
         for (int i = 0; i < 5; ++i) state[i] = group.x[i][lane];
         if (member[lane] == volterra5_OK) {

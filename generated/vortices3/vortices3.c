@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 8f065931d9c78963ccdf9cdc87819a4c007f67475cbe7d76e0efb18db3dcddae
+ * body-sha256: 57504a05fb4a3a01fb86728578766f31471e87a45054f06adc90d9c536b40bcf
  */
 #include "vortices3.h"
 
@@ -826,11 +826,12 @@ static void vortices3_train(vortices3_memory *memory, int component)
     }
     for (int k = 0; k < WINDOW; ++k) q[ROWS + k][k] = 1e-13 * largest;
     for (int k = 0; k < WINDOW; ++k) {
-        for (int i = 0; i < ROWS + WINDOW; ++i)
+        const int rows = ROWS + k + 1; /* further rows of the ridge are still zero in this column */
+        for (int i = 0; i < rows; ++i)
             for (int j = k; j < WINDOW + AHEAD; ++j) r[k][j] += q[i][k] * q[i][j];
         const double scale = r[k][k] > 0.0 ? 1.0 / r[k][k] : 0.0;
         for (int j = k + 1; j < WINDOW + AHEAD; ++j) r[k][j] *= scale;
-        for (int i = 0; i < ROWS + WINDOW; ++i)
+        for (int i = 0; i < rows; ++i)
             for (int j = k + 1; j < WINDOW + AHEAD; ++j) q[i][j] -= q[i][k] * r[k][j];
     }
     for (int l = 0; l < AHEAD; ++l)
@@ -1926,15 +1927,16 @@ static void vortices3_correct(vortices3_lines *line, vortices3_lanes size)
         for (int lane = 0; lane < vortices3_LANES; ++lane) line->y[i][lane] -= delta[i][lane];
 }
 
-/* The largest size; infinite if one is not finite. */
+/* The largest size; infinite if one is not finite. As integers, the bits of numbers that are not negative have their
+   order, and those of what is no number are larger. */
 static double vortices3_largest(const vortices3_lanes size)
 {
-    double largest = 0.0, total = 0.0;
-    for (int lane = 0; lane < vortices3_LANES; ++lane) {
-        total += size[lane];
-        largest = size[lane] > largest ? size[lane] : largest;
-    }
-    return isfinite(total) ? largest : HUGE_VAL;
+    uint64_t bits[8], most = 0;
+    double largest;
+    memcpy(bits, size, sizeof bits);
+    for (int lane = 0; lane < vortices3_LANES; ++lane) most = bits[lane] > most ? bits[lane] : most;
+    memcpy(&largest, &most, sizeof largest);
+    return isfinite(largest) ? largest : HUGE_VAL;
 }
 
 /* What is left after a correction of this size: quadratic in it, where the matrices are of the points corrected; where
@@ -1967,16 +1969,18 @@ static void vortices3_chain(vortices3_lines line[1], double x[6], double carry[6
     for (int k = 0; k < 1 * vortices3_LANES; ++k) {
         const int lane = k / 1, after = (k + 1) / 1 % vortices3_LANES;
         vortices3_lines *at = &line[k % 1], *next = &line[(k + 1) % 1];
-        double correction[6] = { 0.0 };
+        double even[6] = { 0.0 }, odd[6] = { 0.0 }; /* two sums, so that no long chain of additions is waited for */
         for (int i = 0; i < 6; ++i) {
             at->residual[i][lane] = residual[i];
-            for (int j = 0; j < 6; ++j) correction[i] -= at->gain[i * 6 + j][lane] * residual[j];
+            for (int j = 0; j < 6; j += 2) even[i] += at->gain[i * 6 + j][lane] * residual[j];
+            for (int j = 1; j < 6; j += 2) odd[i] += at->gain[i * 6 + j][lane] * residual[j];
         }
         for (int i = 0; i < 6; ++i) {
             const double change = at->increment[i][lane], total = sum[i] + change, added = total - sum[i];
             const double turn = (next->displacement[i][after] - at->displacement[i][lane]) - change;
-            residual[i] = ((next->y[i][after] - at->y[i][lane]) + turn) + (residual[i] - correction[i]);
-            small[i] += ((sum[i] - (total - added)) + (change - added)) + correction[i];
+            const double moved = (next->y[i][after] - at->y[i][lane]) + turn;
+            residual[i] = ((moved + residual[i]) + odd[i]) + even[i];
+            small[i] += ((sum[i] - (total - added)) + (change - added)) - (even[i] + odd[i]);
             sum[i] = total;
         }
     }
@@ -2070,7 +2074,8 @@ static int vortices3_block(vortices3_solver *s, vortices3_table *table, int most
         vortices3_chain(line, x, carry);
         for (int stage = 0; stage < 1; ++stage) {
             vortices3_correct(&line[stage], sizes);
-            size = fmax(size, vortices3_largest(sizes));
+            const double largest = vortices3_largest(sizes);
+            size = largest > size ? largest : size;
         }
         s->evaluations += 1 * vortices3_LANES;
         bend = matrices ? 0.0 : bend + previous;
@@ -2255,10 +2260,12 @@ static void vortices3_group_judge(vortices3_group *group, int stage, vortices3_l
     group->fitting[stage] = vortices3_group_sum(group, row[0]) <= least;
 }
 
-/* Fit the recurrences of all members; with every time, wait longer before it is done again. */
+/* Fit the recurrences of all members; with every time, wait longer before it is done again, and for long if it did not
+   help. */
 static void vortices3_group_fit(vortices3_group *group)
 {
     vortices3_memory memory;
+    const int helped = group->fits == 0 || group->fitting[0];
     memory.count = 96;
     for (int stage = 0; stage < 1; ++stage)
         for (int lane = 0; lane < vortices3_LANES; ++lane) {
@@ -2273,7 +2280,7 @@ static void vortices3_group_fit(vortices3_group *group)
         }
     ++group->fits;
     group->slow = 0;
-    group->patience = group->patience < 10000 ? 2 * group->patience + 1000 : 20000;
+    group->patience = helped && group->patience < 10000 ? 2 * group->patience + 1000 : 100 * 1000;
 }
 
 /* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group.
@@ -2341,8 +2348,8 @@ static void vortices3_group_advance(vortices3_lanes x[restrict 6], vortices3_lan
     }
 }
 
-/* One step of all members. One that fails keeps its state, and leaves. How many are left. */
-static int vortices3_group_step(vortices3_group *group)
+/* One step of all members, of as many as remain. One that fails keeps its state, and leaves. How many are left. */
+static int vortices3_group_step(vortices3_group *group, size_t remaining)
 {
     vortices3_lanes x[6], carry[6];
     vortices3_lines line;
@@ -2360,7 +2367,8 @@ static int vortices3_group_step(vortices3_group *group)
     group->latest = next;
     if (group->count < 96) ++group->count;
     group->slow = most > 1 ? group->slow + 1 : 0;
-    if (group->slow > group->patience && group->count == 96) vortices3_group_fit(group);
+    if (group->slow > group->patience && group->count == 96 && remaining >= 4000)
+        vortices3_group_fit(group);
     for (int lane = 0; lane < vortices3_LANES; ++lane) {
         for (int i = 0; i < 6; ++i)
             if (!isfinite(group->x[i][lane])) group->active[lane] = 0;
@@ -2411,13 +2419,12 @@ static vortices3_status vortices3_group_run(const vortices3_params *params, doub
     const int count = members - first < vortices3_LANES ? (int)(members - first) : vortices3_LANES;
     double state[6];
     memset(&group, 0, sizeof group);
-    group.patience = 1000;
     for (int lane = 0; lane < count; ++lane) {
         for (size_t i = 0; i < 6; ++i) state[i] = x[i * members + first + (size_t)lane];
         group.left[lane] = steps;
         member[lane] = vortices3_group_join(&group, lane, params, state, h);
     }
-    for (size_t k = 0; k < steps && vortices3_group_step(&group) > 2; ++k) continue;
+    for (size_t k = 0; k < steps && vortices3_group_step(&group, steps - k) > 2; ++k) continue;
     for (int lane = 0; lane < count; ++lane) {
         for (int i = 0; i < 6; ++i) state[i] = group.x[i][lane];
         if (member[lane] == vortices3_OK) {

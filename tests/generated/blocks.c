@@ -101,7 +101,7 @@ static void group_equals_steps(int steps)
         if (lane != 3) EXPECT(F(group_join)(&group, lane, NULL, x, STEP) == F(OK));
         group.left[lane] = (size_t)steps;
     }
-    for (int k = 0; k < steps; ++k) EXPECT(F(group_step)(&group) == F(LANES) - 1);
+    for (int k = 0; k < steps; ++k) EXPECT(F(group_step)(&group, 1) == F(LANES) - 1);
     for (int lane = 0; lane < F(LANES); ++lane) {
         if (lane == 3) continue;
         for (int i = 0; i < DIM; ++i) x[i] = start[i] * (1.0 + 1e-3 * lane);
@@ -121,15 +121,14 @@ static void group_fits(void)
     F(lanes) guess[DIM], rough[DIM], last[DIM];
     double apart = 0.0, moved = 0.0, a[DIM], b[DIM];
     memset(&group, 0, sizeof group);
-    group.patience = 1 << 30;
     for (int lane = 0; lane < F(LANES); ++lane) EXPECT(F(group_join)(&group, lane, NULL, start, STEP) == F(OK));
     for (int lane = 0; lane < F(LANES); ++lane) group.left[lane] = ROWS + 1;
-    for (int k = 0; k < ROWS; ++k) F(group_step)(&group);
+    for (int k = 0; k < ROWS; ++k) F(group_step)(&group, 1);
     F(group_fit)(&group);
     F(group_foresee)(&group, 0, guess);
     F(group_extrapolate)(&group, 0, rough);
     memcpy(last, group.past[0][group.latest], sizeof last);
-    F(group_step)(&group);
+    F(group_step)(&group, 1);
     for (int lane = 0; lane < F(LANES); ++lane) {
         for (int i = 0; i < DIM; ++i) a[i] = guess[i][lane];
         for (int i = 0; i < DIM; ++i) b[i] = group.past[0][group.latest][i][lane];

@@ -123,7 +123,7 @@ def pieces(program: Program, values: Mapping[str, object]) -> list[str]:
         "choose_guess",
         "integrate_blocks",
     ]
-    templates += ["group", "group_guess", "group_solve", "group_step", "group_run", "ensemble"]
+    templates += ["group", "group_guess", "group_fit", "group_solve", "group_step", "group_run", "ensemble"]
     return found + [render("c", f"{template}.c", values) for template in templates]
 
 
