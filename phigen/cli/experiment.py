@@ -48,7 +48,7 @@ def prepared(
         raise SpecError([Diagnostic(f"{spec.file}: the spec has no runs", hint=hint)])
     run = spec.runs.get(name) if name else next(iter(spec.runs.values()))
     if run is None:
-        raise click.BadParameter(f"there is no run {name!r}; there are {', '.join(spec.runs)}", param_hint="--run")
+        raise click.BadParameter(f"there is no run {name!r}; the spec has {', '.join(spec.runs)}", param_hint="--run")
     if step is not None:
         if step == 0 or not math.isfinite(step):
             raise click.BadParameter("the step must be a finite number, and not 0", param_hint="--step")

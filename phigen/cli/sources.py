@@ -38,11 +38,13 @@ many_specs = click.argument("spec_files", metavar="SPEC...", nargs=-1, required=
 
 
 def file_ending(*suffixes: str) -> Callable[[click.Context, click.Parameter, str | None], Path | None]:
-    """The callback of an option that names a file: checks its suffix before any work is done."""
+    """The callback of an option that names a file: checks its suffix and its folder before any work is done."""
 
     def checked(ctx: click.Context, parameter: click.Parameter, value: str | None) -> Path | None:
         if value is not None and Path(value).suffix.lower() not in suffixes:
             raise click.BadParameter(f"{value!r} must end in {' or '.join(suffixes)}")
+        if value is not None and not Path(value).parent.is_dir():
+            raise click.BadParameter(f"there is no folder {str(Path(value).parent)!r}")
         return Path(value) if value is not None else None
 
     return checked

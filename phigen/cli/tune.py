@@ -11,7 +11,7 @@ import click
 
 from phigen.cli.console import Console, out, pass_console, verbosity
 from phigen.cli.experiment import prepared
-from phigen.cli.sources import load_one, one_spec
+from phigen.cli.sources import FIGURES, file_ending, load_one, one_spec
 from phigen.cli.tune_summary import described, print_tuning, unreached
 from phigen.errors import CheckError
 
@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from phigen.analysis.tuning.problem import Problem
     from phigen.cli.experiment import Experiment
     from phigen.geometry.system import System
-
-_PLOTS = (".png", ".svg", ".pdf")
 
 
 @click.command("tune")
@@ -37,7 +35,8 @@ _PLOTS = (".png", ".svg", ".pdf")
 @click.option("--horizon", type=float, metavar="T", help="How long a run is.  [default: as in the spec]")
 @click.option("--set", "settings", metavar="NAME=VALUE", multiple=True, help="A parameter, or an initial coordinate.")
 @click.option("--budget", type=float, default=60.0, show_default=True, metavar="SECONDS", help="How long to search.")
-@click.option("--plot", metavar="FILE", help="Draw error against time: FILE.png, .svg or .pdf.")
+@click.option("--plot", metavar="FILE", callback=file_ending(*FIGURES),
+              help="Draw error against time: FILE.png, FILE.svg or FILE.pdf.")  # fmt: skip
 @click.option("--json", "as_json", is_flag=True, help="For machines: everything that was measured.")
 @verbosity
 @pass_console
@@ -50,7 +49,7 @@ def command(
     horizon: float | None,
     settings: tuple[str, ...],
     budget: float,
-    plot: str | None,
+    plot: Path | None,
     as_json: bool,
 ) -> None:
     """Find the cheapest bi-realisation, order, gauge, composition and step for an accuracy.
@@ -66,7 +65,9 @@ def command(
     _expect_positive(horizon, "--horizon")
     _expect_positive(budget, "--budget")
     if plot:
-        _expect_figure(Path(plot))
+        from phigen.analysis.drawing.palette import require_matplotlib
+
+        require_matplotlib()
     spec = load_one(spec_file)
     experiment = prepared(spec, name, settings=settings)
     compilation = compile_proved(spec)
@@ -77,7 +78,7 @@ def command(
     if plot:
         from phigen.analysis import figures
 
-        figures.save(figures.tuning_figure(found, f"{spec.name}, run {experiment.run.name}"), plot)
+        figures.save(figures.tuning_figure(found, f"{spec.name}, run {experiment.run.name}"), str(plot))
         console.note(f"wrote {plot}")
     if as_json:
         out(json.dumps(described(found, spec, experiment.run), indent=2, ensure_ascii=False))
@@ -85,17 +86,6 @@ def command(
         print_tuning(found, spec, experiment.run)
     if not found.winner:
         raise CheckError(unreached(found))
-
-
-def _expect_figure(path: Path) -> None:
-    """What would be in the way of a figure is told before any work is done."""
-    from phigen.analysis.drawing.palette import require_matplotlib
-
-    if path.suffix.lower() not in _PLOTS:
-        raise click.BadParameter(f"{str(path)!r} must end in {', '.join(_PLOTS)}", param_hint="--plot")
-    if not path.parent.is_dir():
-        raise click.BadParameter(f"there is no folder {str(path.parent)!r}", param_hint="--plot")
-    require_matplotlib()
 
 
 def _expect_positive(value: float | None, option: str) -> None:

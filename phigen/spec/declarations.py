@@ -12,7 +12,7 @@ from fractions import Fraction
 from graphlib import CycleError, TopologicalSorter
 from typing import Any
 
-from phigen.spec.grammar import Scope, constant, names_in, parse
+from phigen.spec.grammar import CONSTANTS, Scope, constant, names_in, parse
 from phigen.spec.kinds import Reader
 from phigen.spec.model import Parameter
 from phigen.spec.names import ARGUMENTS, SPEC_FUNCTIONS
@@ -140,11 +140,14 @@ def declare(raw: Raw, reader: Reader) -> Declarations:
 
 
 def _declare_parameters(raw: Raw, declared: Declarations) -> None:
+    others = {*declared.coordinates, *raw.get("parameters", {}), *raw.get("definitions", {})} - {*CONSTANTS}
+    why = "the value of a parameter is a number"
+    numbers = Scope({}, {n: (why, f"what depends on {n!r} can be a definition") for n in others})
     for name, (key, value) in raw.get("parameters", {}).items():
         if not declared.declare(key, "parameter"):
             continue
         options: dict[str, Any] = {"value": value} if isinstance(value, Scalar) else value or {}
-        number = declared.number(options.get("value"))
+        number = declared.number(options.get("value"), numbers)
         positive = options.get("positive", False)
         if number is not None and positive and number <= 0:
             message = f"the parameter {name!r} is positive by declaration, but its value is {options['value'].text}"

@@ -247,6 +247,14 @@ def test_files_of_other_kinds_are_refused_before_the_work(phigen, in_tmp, option
     assert "must end in" in done.stderr
 
 
+@pytest.mark.parametrize("command", [("run", "-o", "a.csv"), ("run", "--plot", "a.svg"), ("tune", "--plot", "a.svg")])
+def test_folders_that_are_not_there_are_told_before_the_work(phigen, in_tmp, command):
+    name, option, file = command
+    done = phigen(name, "nowhere.yaml", option, f"lost/{file}")
+    assert done.exit_code == 2
+    assert "there is no folder 'lost'" in done.stderr
+
+
 @pytest.mark.parametrize("suffix", ["png", "svg", "pdf"])
 def test_the_same_run_is_drawn_with_the_same_bytes(phigen, write, suffix):
     path = write("a.yaml")

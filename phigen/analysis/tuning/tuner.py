@@ -133,7 +133,8 @@ class Tuner:
         outcomes: dict[Setting, Outcome] = {s: self._made[s] for s in settings if s in self._made}
         until = min(self.clock.at(SEARCHING), time.perf_counter() + BUILDING * self.clock.budget)
         wanted = self._affordable([s for s in settings if s not in self._made])
-        self.note(f"building {len(wanted)} more")
+        if wanted:
+            self.note(f"building {len(wanted)} more")
         outcomes |= build_all(self.compilation.spec, self.compilation.system, wanted, until)
         for setting in (s for s in settings if s in outcomes):
             outcome = outcomes[setting]
