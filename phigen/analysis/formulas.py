@@ -113,6 +113,13 @@ def _infix(e: Expression) -> str:
     def wrap(part: tuple[str, int], level: int) -> str:
         return part[0] if part[1] >= level else f"({part[0]})"
 
+    def raised(base: tuple[str, int], exponent: Fraction) -> str:
+        if exponent == Fraction(1, 2):
+            return f"sqrt({base[0]})"
+        if exponent == 1:
+            return wrap(base, 3)
+        return f"{wrap(base, 4)}**{exponent}" if exponent.denominator == 1 else f"{wrap(base, 4)}**({exponent})"
+
     def visit(node: Expression, args: list[tuple[str, int]]) -> tuple[str, int]:
         match node.op:
             case "add":
@@ -125,14 +132,14 @@ def _infix(e: Expression) -> str:
                 return f"-{wrap(args[0], 2)}", 1
             case "mul" if node.args[0].is_number and node.args[0].value < 0:
                 return f"-{text(-node.args[0])}*{wrap(args[1], 2)}", 1
-            case "mul" if node.args[1].op == "pow" and node.args[1].value == -1:
+            case "mul" if args[1][0].startswith("1/") and args[1][1] > 1:
                 return f"{wrap(args[0], 2)}/{args[1][0].removeprefix('1/')}", 2
             case "mul":
                 return f"{wrap(args[0], 2)}*{wrap(args[1], 2)}", 2
-            case "pow" if node.value == -1:
-                return f"1/{wrap(args[0], 3)}", 2
-            case "pow" if node.value.denominator == 1 and node.value > 0:
-                return f"{wrap(args[0], 4)}**{node.value}", 3
+            case "pow" if node.value < 0:
+                return f"1/{raised(args[0], -node.value)}", 2
+            case "pow":
+                return raised(args[0], node.value), 4 if node.value == Fraction(1, 2) else 3
             case _ if node.args and node.op not in ("pow", "power"):
                 return f"{_GREEK.get(node.op, node.op)}({', '.join(a for a, _ in args)})", 4
         written = text(node)

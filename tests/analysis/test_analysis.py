@@ -124,7 +124,8 @@ def test_readable_formulas_keep_their_value_and_lose_colons():
 @pytest.mark.parametrize(
     "formula",
     ["x - (y - z) - (x + y)", "x*(y/z)/(x*y)", "-(x + y)**3*2", "x/(y + z)**2", "1/x - 1/(y*z)", "-x**2 - -3*y*(-z)",
-     "exp(-x/y) - sqrt(x + 1)*2", "x**(3/2)*(y - 1)", "(x*y)**2/3", "-1/2*(x - y)", "x*(-(y + z))"],
+     "exp(-x/y) - sqrt(x + 1)*2", "x**(3/2)*(y - 1)", "(x*y)**2/3", "-1/2*(x - y)", "x*(-(y + z))",
+     "(x + z)*(1/y**2 - z**2)", "z*(x/y)**2/sqrt(2)", "(x + y)**(-3/2)*z", "1/(x*sqrt(y + z))", "(sqrt(x) + z)**2/x"],
 )  # fmt: skip
 def test_fewer_parentheses_do_not_change_the_value(formula):
     head = "phigen: 1\nname: t\ncoordinates: [x, y, z]\npoisson: {matrix: [[0, 0, 0], [0, 0, 0], [0, 0, 0]]}\n"
@@ -132,6 +133,7 @@ def test_fewer_parentheses_do_not_change_the_value(formula):
     values = {"x": 1.3, "y": 0.7, "z": 2.1}
     functions = {"exp": math.exp, "sqrt": math.sqrt}
     assert eval(formulas._infix(e), {**functions, **values}) == pytest.approx(evaluate([e], values)[0], rel=1e-14)
+    assert "**(-" not in formulas._infix(e)  # denominators are written as such
 
 
 def test_starter_spec_summary_agrees_with_the_solver():
