@@ -67,7 +67,8 @@ class Drift:
 
     A trajectory of fewer steps has one part for each.
 
-    The size at a state is Σ |x_i ∂_i C|, at least |C|: what rounding of the coordinates alone amounts to.
+    The size at a state is Σ |x_i ∂_i C|, at least |C|: what rounding of the coordinates alone amounts to. As errors add
+    up, they are relative to the largest size up to the state that has them: the terms of C may all vanish there.
     """
 
     windows: tuple[float, ...]
@@ -92,7 +93,7 @@ def drifts(
     for name, quantity in quantities.items():
         value, *slopes = (np.broadcast_to(a, len(rows)) for a in _with_gradient(quantity, system.coordinates, values))
         size = np.maximum(np.abs(value[0]), sum(abs(rows[:, i] * g) for i, g in enumerate(slopes)))
-        size = np.maximum(size, size[0])
+        size = np.maximum.accumulate(size)
         error = np.abs(value - value[0]) / np.where(size > 0, size, 1.0)
         windows = np.array_split(error[1:], min(WINDOWS, len(error) - 1))
         found[name] = Drift(tuple(float(np.max(part)) for part in windows))

@@ -51,6 +51,25 @@ def failed(found):
     return {check.name for check in found.checks if not check.passed}
 
 
+def test_rounding_is_seen_as_such_where_all_terms_of_a_casimir_vanish():
+    """A pendulum that swings through its lowest point, where m1 g1 + m2 g2 + m3 g3 is a sum of zeros."""
+    casimirs = "{G: g1**2 + g2**2 + g3**2, L: m1*g1 + m2*g2 + m3*g3}"
+    text = f"""phigen: 1
+name: t
+coordinates: [m1, m2, m3, g1, g2, g3]
+poisson: {{lie_algebra: {{name: se(3), sign: minus}}}}
+hamiltonian: (m1**2 + m2**2 + m3**2)/2 + 10*g3
+casimirs: {casimirs}
+"""
+    compilation = compilation_of(text)
+    start = np.array([0.3, 1.2, 0.0, 0.0, 0.0, -1.0])
+    rows = solver_of(compilation, "c").integrate(start, h=0.02, steps=10_000).x
+    drift = measures.drifts(compilation.system, compilation.system.casimirs, {}, rows)
+    assert drift["L"].error < 1e-14
+    rows[5000:, 0] += 1e-9
+    assert measures.drifts(compilation.system, compilation.system.casimirs, {}, rows)["L"].error > 1e-10
+
+
 def test_modified_hamiltonian_is_constant_to_higher_order_for_each_correction():
     compilation = compilation_of()
     found = verified(compilation, {"c": solver_of(compilation, "c")})
