@@ -64,8 +64,9 @@ def _generating_function(compilation: Compilation) -> list[Markup]:
         return blocks
     blocks.append(page.heading("Modified Hamiltonian"))
     blocks.append(page.paragraph("A step is the exact flow, over the time h, of a Hamiltonian near H:"))
-    leading = f"{_power('h', compilation.order.order)}<mo>&#x2062;</mo><mi>M</mi><mo>+</mo><mo>…</mo>"
-    return [*blocks, page.equations([[mathml.math(MODIFIED + leading)]]), polynomial("<mi>M</mi>", correction)]
+    power, first = compilation.order.order, _indexed("H", compilation.order.order)
+    leading = f"{_power('h', power)}<mo>&#x2062;</mo>{first}<mo>+</mo><mo>…</mo>"
+    return [*blocks, page.equations([[mathml.math(MODIFIED + leading)]]), polynomial(first, correction)]
 
 
 def _splitting(compilation: Compilation) -> list[Markup]:
