@@ -92,6 +92,7 @@ def build_program(
         relative=isinstance(system.shape, LogCanonical),
         symmetric=realisation.symmetric,
         max_iterations=solver.max_iterations,
+        lanes=solver.lanes,
         tolerance=1e-20 if solver.tolerance is None else float(solver.tolerance),
         license=licence,
         spec_sha256=spec_sha256,

@@ -79,6 +79,7 @@ class Program:
     relative: bool = False
     symmetric: bool = True
     max_iterations: int = 20
+    lanes: bool = True
     tolerance: float = 1e-17
     license: str = "0BSD"
     spec_sha256: str = ""

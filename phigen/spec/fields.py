@@ -125,6 +125,7 @@ SOLVER = Record(
         Field("method", Choice(("auto", "newton")), "how the implicit step is solved", default="auto"),
         Field("tolerance", Formula(), "auto, or the tolerance of the solve", default="auto"),
         Field("max_iterations", Integer(1, 1000), "iterations before a step fails", default=20),
+        Field("lanes", Boolean(), "C: many steps, and ensembles, eight at a time; longer code", default=True),
     ),
 )
 RUN = Record(

@@ -114,11 +114,15 @@ class BirealisationChoice:
 
 @dataclass(frozen=True)
 class SolverOptions:
-    """The inner solve: ``method`` auto or newton, ``tolerance`` None for auto."""
+    """The inner solve: ``method`` auto or newton, ``tolerance`` None for auto.
+
+    ``lanes``: whether C code takes steps, and members of ensembles, eight at a time. Without it is shorter, and slower.
+    """
 
     method: str = "auto"
     tolerance: Fraction | None = None
     max_iterations: int = 20
+    lanes: bool = True
 
 
 @dataclass(frozen=True)

@@ -3,8 +3,9 @@
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
-from support import COMMAND, NAMES, compiled, run, setting, tool, write
+from support import COMMAND, NAMES, compile_text, compiled, run, setting, solver, tool, write
 
 from phigen.compiler import compile_spec, emit
 from phigen.targets.c import lanes
@@ -47,3 +48,15 @@ def exercise(compilation, optimisation, folder):
     flags = ["-std=c99", optimisation, "-Wall", "-Wextra", "-Werror", "-Wno-unused-function"]
     run([tool("gcc"), *flags, *definitions, "-I.", EXERCISE, "-o", "blocks", "-lm"], folder)
     run([folder / "blocks"], folder)
+
+
+def test_code_without_lanes_is_shorter_and_does_the_same():
+    """`lanes: false`: a loop over single steps, which blocks agree with."""
+    body = "coordinates: [q, p]\npoisson: {canonical: {q: [q], p: [p]}}\nhamiltonian: p**2/2 + q**4/4\norder: 4\n"
+    with_lanes, without = compile_text(body), compile_text(f"{body}solver: {{lanes: false}}\n")
+    lengths = [len(emit(c.program, "c", COMMAND)["t.c"].splitlines()) for c in (with_lanes, without)]
+    assert lengths[1] < 0.6 * lengths[0]
+    ends = [solver(c, "c").integrate([1.0, 0.0], 0.1, 400, stride=400).x[-1] for c in (with_lanes, without)]
+    np.testing.assert_allclose(ends[1], ends[0], rtol=0, atol=1e-14)
+    many = solver(without, "c").ensemble([[1.0, 0.0], [0.5, 0.1], [2.0, 0.0]], 0.1, 400)
+    np.testing.assert_allclose(many[0], ends[0], rtol=0, atol=1e-14)

@@ -56,10 +56,11 @@ _PI = 3.141592651605606, 1.9841871479187034e-09, 1.1442377452219664e-17
 
 
 def blocks(program: Program) -> bool:
-    """Whether `integrate` takes blocks of steps: not for paths, explicit steps, or what would need too much stack."""
+    """Whether `integrate` takes blocks of steps: not for paths, explicit steps, what would need too much stack, or
+    where the spec says no."""
     n = program.dimension
     values = len(program.fractions) * (program.coefficients + 4 * n + 3 * n * n)
-    return program.driver == "newton" and 8 * LANES * values <= MOST_STACK
+    return program.lanes and program.driver == "newton" and 8 * LANES * values <= MOST_STACK
 
 
 def vectorised(program: Program) -> bool:
