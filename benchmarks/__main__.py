@@ -8,11 +8,12 @@ import time
 from dataclasses import asdict
 from pathlib import Path
 
-from benchmarks import studies, tables
+from benchmarks import plots, studies, tables
 from benchmarks.problems import PROBLEMS
 
 ROOT = Path(__file__).resolve().parent.parent
 DOCUMENT = ROOT / "docs" / "benchmarks.md"
+FIGURES = DOCUMENT.parent / "figures"
 BEGIN, END = "<!-- results: begin -->", "<!-- results: end -->"
 QUESTIONS = ("work", "steps", "ensembles", "growth", "build")
 
@@ -39,7 +40,9 @@ def main() -> None:
         found = [s for p in chosen for s in studies.work_precision(p, effort, say)]
         data["work"] = [asdict(s) for s in found]
         parts.append("## Work and precision\n\n" + tables.speed_ups(found))
-        parts += [tables.work_precision(s) for s in found]
+        figures = plots.draw(found, FIGURES) if options.write_docs else {}
+        for s in found:
+            parts += [tables.work_precision(s), figures.pop(s.problem, "")]
     if "steps" in options.only:
         say("cost of steps")
         rows = [row for p in chosen for row in studies.cost_of_steps(p, effort)]
