@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 0a0e95b2f695b5522e2184e7359a631d813cc76feadfaa1d3e0bd7eebf83e31e
+ * body-sha256: 6b4b82244bed3ab907f15520d732513e367878c4f231358f9c6003be6c6561f2
  */
 #include "ablowitz_ladik3.h"
 
@@ -155,7 +155,19 @@ static int ablowitz_ladik3_solve(double matrix[36], double side[6])
     return 1;
 }
 
-/* The guess for the next value (p), from earlier ones; 0 if there are none. */
+/* Whether a guess is where the next values may be. Recurrences that were fitted to little else than rest, near a saddle,
+   may lead anywhere; and far away the equation of a step has solutions that have nothing to do with the motion. */
+static int ablowitz_ladik3_near(const double guess[6], const double last[6])
+{
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < 6; ++i) {
+        distance += fabs(guess[i] - last[i]);
+        size += fabs(last[i]);
+    }
+    return distance <= 4.0 * size;
+}
+
+/* The guess for the next value (p), from earlier ones; 0 if there is none. */
 static int ablowitz_ladik3_predict(const ablowitz_ladik3_memory *memory, double value[6])
 {
     const int last = memory->count - 1;
@@ -174,7 +186,7 @@ static int ablowitz_ladik3_predict(const ablowitz_ladik3_memory *memory, double 
             for (int i = 0; i < 6; ++i) value[i] += binomial * memory->past[last - k][i];
         }
     }
-    return last >= 0;
+    return last >= 0 && ablowitz_ladik3_near(value, memory->past[last]);
 }
 
 /* Choose the guess that would have been best for a value that took several iterations. */

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 57a85a7f2d9e938eaeda86dade875b47cd640c4daea8c41002a4bb29afcdbdfb
+ * body-sha256: 122123177239e6d145345c9f04702e125742dbbce4052c15aa3c374c54708acf
  */
 #include "charged_particle.h"
 
@@ -171,7 +171,19 @@ static int charged_particle_solve(double matrix[36], double side[6])
     return 1;
 }
 
-/* The guess for the next value (p), from earlier ones; 0 if there are none. */
+/* Whether a guess is where the next values may be. Recurrences that were fitted to little else than rest, near a saddle,
+   may lead anywhere; and far away the equation of a step has solutions that have nothing to do with the motion. */
+static int charged_particle_near(const double guess[6], const double last[6])
+{
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < 6; ++i) {
+        distance += fabs(guess[i] - last[i]);
+        size += fabs(last[i]);
+    }
+    return distance <= 4.0 * size;
+}
+
+/* The guess for the next value (p), from earlier ones; 0 if there is none. */
 static int charged_particle_predict(const charged_particle_memory *memory, double value[6])
 {
     const int last = memory->count - 1;
@@ -190,7 +202,7 @@ static int charged_particle_predict(const charged_particle_memory *memory, doubl
             for (int i = 0; i < 6; ++i) value[i] += binomial * memory->past[last - k][i];
         }
     }
-    return last >= 0;
+    return last >= 0 && charged_particle_near(value, memory->past[last]);
 }
 
 /* Choose the guess that would have been best for a value that took several iterations. */

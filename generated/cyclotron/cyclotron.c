@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 0cac0421965d82426eec7df3279bcfc4341b892a9cab9e95cb2050e4740af8b1
+ * body-sha256: 19682416bcc378d3af0ebc7130c42d1e958c90c16899a57081e6a838d449a674
  */
 #include "cyclotron.h"
 
@@ -146,7 +146,19 @@ static int cyclotron_solve(double matrix[9], double side[3])
     return 1;
 }
 
-/* The guess for the next value (y), from earlier ones; 0 if there are none. */
+/* Whether a guess is where the next values may be. Recurrences that were fitted to little else than rest, near a saddle,
+   may lead anywhere; and far away the equation of a step has solutions that have nothing to do with the motion. */
+static int cyclotron_near(const double guess[3], const double last[3])
+{
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < 3; ++i) {
+        distance += fabs(guess[i] - last[i]);
+        size += fabs(last[i]);
+    }
+    return distance <= 4.0 * size;
+}
+
+/* The guess for the next value (y), from earlier ones; 0 if there is none. */
 static int cyclotron_predict(const cyclotron_memory *memory, double value[3])
 {
     const int last = memory->count - 1;
@@ -165,7 +177,7 @@ static int cyclotron_predict(const cyclotron_memory *memory, double value[3])
             for (int i = 0; i < 3; ++i) value[i] += binomial * memory->past[last - k][i];
         }
     }
-    return last >= 0;
+    return last >= 0 && cyclotron_near(value, memory->past[last]);
 }
 
 /* Choose the guess that would have been best for a value that took several iterations. */
@@ -585,7 +597,7 @@ static void cyclotron_correct(cyclotron_lines *line, cyclotron_lanes size)
         for (int lane = 0; lane < cyclotron_LANES; ++lane) line->y[i][lane] -= delta[i][lane];
 }
 
-/* The largest size; infinite if one is not finite. As integers, the bits of numbers that are not negative have their
+/* The largest of the lanes, which are not negative; infinite if one is not finite. As integers, the bits of numbers that are not negative have their
    order, and those of what is no number are larger. */
 static double cyclotron_largest(const cyclotron_lanes size)
 {
@@ -595,6 +607,19 @@ static double cyclotron_largest(const cyclotron_lanes size)
     for (int lane = 0; lane < cyclotron_LANES; ++lane) most = bits[lane] > most ? bits[lane] : most;
     memcpy(&largest, &most, sizeof largest);
     return isfinite(largest) ? largest : HUGE_VAL;
+}
+
+/* cyclotron_near for the guesses of all lanes, seen from one value. */
+static int cyclotron_near_lanes(cyclotron_lanes y[restrict 3], const double last[3])
+{
+    cyclotron_lanes distance = { 0.0 };
+    double size = 0.0;
+    for (int i = 0; i < 3; ++i) {
+        size += fabs(last[i]);
+        cyclotron_EACH_LANE
+        for (int lane = 0; lane < cyclotron_LANES; ++lane) distance[lane] += fabs(y[i][lane] - last[i]);
+    }
+    return cyclotron_largest(distance) <= 4.0 * size;
 }
 
 /* What is left after a correction of this size: quadratic in it, where the matrices are of the points corrected; where
@@ -721,8 +746,10 @@ static int cyclotron_block(cyclotron_solver *s, cyclotron_table *table, int most
     double x[3], carry[3], value[3], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
     if (!s->foreseeing) cyclotron_march(s, table, line);
-    for (int stage = 0; stage < 1 && s->foreseeing; ++stage)
-        cyclotron_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
+    for (int stage = 0; stage < 1; ++stage) {
+        if (s->foreseeing) cyclotron_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
+        if (!cyclotron_near_lanes(line[stage].y, s->x)) return 0;
+    }
     while (!solved) {
         double size = 0.0;
         const int matrices = previous > 1e-05;
@@ -956,6 +983,21 @@ static int cyclotron_group_open(cyclotron_group *group, const cyclotron_lanes si
     return open;
 }
 
+/* The guess for a stage: recurrences, or extrapolation; the state for members where that is not near. */
+static void cyclotron_group_predict(cyclotron_group *group, int stage, cyclotron_lanes y[3])
+{
+    if (group->fitting[stage]) cyclotron_group_foresee(group, stage, y);
+    else cyclotron_group_extrapolate(group, stage, y);
+    for (int lane = 0; lane < cyclotron_LANES; ++lane) {
+        double distance = 0.0, size = 0.0;
+        for (int i = 0; i < 3; ++i) {
+            distance += fabs(y[i][lane] - group->x[i][lane]);
+            size += fabs(group->x[i][lane]);
+        }
+        for (int i = 0; i < 3 && !(distance <= 4.0 * size); ++i) y[i][lane] = group->x[i][lane];
+    }
+}
+
 /* Newton's method for a stage, until the slowest lane is solved. The number of iterations; where that is the most
    allowed, lanes that are not solved leave the group. */
 static int cyclotron_group_solve(cyclotron_group *group, int stage, cyclotron_lines *line)
@@ -964,8 +1006,7 @@ static int cyclotron_group_solve(cyclotron_group *group, int stage, cyclotron_li
     double largest = HUGE_VAL, bend = 0.0;
     int iterations = 0, open = 1;
     for (int lane = 0; lane < cyclotron_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
-    if (group->fitting[stage]) cyclotron_group_foresee(group, stage, line->y);
-    else cyclotron_group_extrapolate(group, stage, line->y);
+    cyclotron_group_predict(group, stage, line->y);
     for (; open > 0 && iterations < 20; ++iterations) {
         memcpy(previous, size, sizeof size);
         cyclotron_update(group->coef[stage], line, largest > 1e-05);

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: b4ec355255c44cfe29e91d066caf3d81b437250eeb29f820bfa450daa64dae1a
+ * body-sha256: b28622386dc0a71d156f5a0a1aded4c35a581b5f7203cfe6ab2b37bcd31312f5
  */
 #include "engel_geodesics.h"
 
@@ -186,7 +186,19 @@ static int engel_geodesics_solve(double matrix[16], double side[4])
     return 1;
 }
 
-/* The guess for the next value (y), from earlier ones; 0 if there are none. */
+/* Whether a guess is where the next values may be. Recurrences that were fitted to little else than rest, near a saddle,
+   may lead anywhere; and far away the equation of a step has solutions that have nothing to do with the motion. */
+static int engel_geodesics_near(const double guess[4], const double last[4])
+{
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < 4; ++i) {
+        distance += fabs(guess[i] - last[i]);
+        size += fabs(last[i]);
+    }
+    return distance <= 4.0 * size;
+}
+
+/* The guess for the next value (y), from earlier ones; 0 if there is none. */
 static int engel_geodesics_predict(const engel_geodesics_memory *memory, double value[4])
 {
     const int last = memory->count - 1;
@@ -205,7 +217,7 @@ static int engel_geodesics_predict(const engel_geodesics_memory *memory, double 
             for (int i = 0; i < 4; ++i) value[i] += binomial * memory->past[last - k][i];
         }
     }
-    return last >= 0;
+    return last >= 0 && engel_geodesics_near(value, memory->past[last]);
 }
 
 /* Choose the guess that would have been best for a value that took several iterations. */
@@ -697,7 +709,7 @@ static void engel_geodesics_correct(engel_geodesics_lines *line, engel_geodesics
         for (int lane = 0; lane < engel_geodesics_LANES; ++lane) line->y[i][lane] -= delta[i][lane];
 }
 
-/* The largest size; infinite if one is not finite. As integers, the bits of numbers that are not negative have their
+/* The largest of the lanes, which are not negative; infinite if one is not finite. As integers, the bits of numbers that are not negative have their
    order, and those of what is no number are larger. */
 static double engel_geodesics_largest(const engel_geodesics_lanes size)
 {
@@ -707,6 +719,19 @@ static double engel_geodesics_largest(const engel_geodesics_lanes size)
     for (int lane = 0; lane < engel_geodesics_LANES; ++lane) most = bits[lane] > most ? bits[lane] : most;
     memcpy(&largest, &most, sizeof largest);
     return isfinite(largest) ? largest : HUGE_VAL;
+}
+
+/* engel_geodesics_near for the guesses of all lanes, seen from one value. */
+static int engel_geodesics_near_lanes(engel_geodesics_lanes y[restrict 4], const double last[4])
+{
+    engel_geodesics_lanes distance = { 0.0 };
+    double size = 0.0;
+    for (int i = 0; i < 4; ++i) {
+        size += fabs(last[i]);
+        engel_geodesics_EACH_LANE
+        for (int lane = 0; lane < engel_geodesics_LANES; ++lane) distance[lane] += fabs(y[i][lane] - last[i]);
+    }
+    return engel_geodesics_largest(distance) <= 4.0 * size;
 }
 
 /* What is left after a correction of this size: quadratic in it, where the matrices are of the points corrected; where
@@ -833,8 +858,10 @@ static int engel_geodesics_block(engel_geodesics_solver *s, engel_geodesics_tabl
     double x[4], carry[4], value[4], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
     if (!s->foreseeing) engel_geodesics_march(s, table, line);
-    for (int stage = 0; stage < 1 && s->foreseeing; ++stage)
-        engel_geodesics_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
+    for (int stage = 0; stage < 1; ++stage) {
+        if (s->foreseeing) engel_geodesics_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
+        if (!engel_geodesics_near_lanes(line[stage].y, s->x)) return 0;
+    }
     while (!solved) {
         double size = 0.0;
         const int matrices = previous > 1e-05;
@@ -1068,6 +1095,21 @@ static int engel_geodesics_group_open(engel_geodesics_group *group, const engel_
     return open;
 }
 
+/* The guess for a stage: recurrences, or extrapolation; the state for members where that is not near. */
+static void engel_geodesics_group_predict(engel_geodesics_group *group, int stage, engel_geodesics_lanes y[4])
+{
+    if (group->fitting[stage]) engel_geodesics_group_foresee(group, stage, y);
+    else engel_geodesics_group_extrapolate(group, stage, y);
+    for (int lane = 0; lane < engel_geodesics_LANES; ++lane) {
+        double distance = 0.0, size = 0.0;
+        for (int i = 0; i < 4; ++i) {
+            distance += fabs(y[i][lane] - group->x[i][lane]);
+            size += fabs(group->x[i][lane]);
+        }
+        for (int i = 0; i < 4 && !(distance <= 4.0 * size); ++i) y[i][lane] = group->x[i][lane];
+    }
+}
+
 /* Newton's method for a stage, until the slowest lane is solved. The number of iterations; where that is the most
    allowed, lanes that are not solved leave the group. */
 static int engel_geodesics_group_solve(engel_geodesics_group *group, int stage, engel_geodesics_lines *line)
@@ -1076,8 +1118,7 @@ static int engel_geodesics_group_solve(engel_geodesics_group *group, int stage, 
     double largest = HUGE_VAL, bend = 0.0;
     int iterations = 0, open = 1;
     for (int lane = 0; lane < engel_geodesics_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
-    if (group->fitting[stage]) engel_geodesics_group_foresee(group, stage, line->y);
-    else engel_geodesics_group_extrapolate(group, stage, line->y);
+    engel_geodesics_group_predict(group, stage, line->y);
     for (; open > 0 && iterations < 20; ++iterations) {
         memcpy(previous, size, sizeof size);
         engel_geodesics_update(group->coef[stage], line, largest > 1e-05);

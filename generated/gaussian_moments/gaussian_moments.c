@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 561ec9188a4cc87c26e3ad10ddc32ad48e604f46af91acda7d8b1d9dd71a0fba
+ * body-sha256: f020488f62e19238ec86be1d5d34897816f7b279885e4b4c60b8c016d76cf3ed
  */
 #include "gaussian_moments.h"
 
@@ -293,7 +293,19 @@ static int gaussian_moments_solve(double matrix[9], double side[3])
     return 1;
 }
 
-/* The guess for the next value (y), from earlier ones; 0 if there are none. */
+/* Whether a guess is where the next values may be. Recurrences that were fitted to little else than rest, near a saddle,
+   may lead anywhere; and far away the equation of a step has solutions that have nothing to do with the motion. */
+static int gaussian_moments_near(const double guess[3], const double last[3])
+{
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < 3; ++i) {
+        distance += fabs(guess[i] - last[i]);
+        size += fabs(last[i]);
+    }
+    return distance <= 4.0 * size;
+}
+
+/* The guess for the next value (y), from earlier ones; 0 if there is none. */
 static int gaussian_moments_predict(const gaussian_moments_memory *memory, double value[3])
 {
     const int last = memory->count - 1;
@@ -312,7 +324,7 @@ static int gaussian_moments_predict(const gaussian_moments_memory *memory, doubl
             for (int i = 0; i < 3; ++i) value[i] += binomial * memory->past[last - k][i];
         }
     }
-    return last >= 0;
+    return last >= 0 && gaussian_moments_near(value, memory->past[last]);
 }
 
 /* Choose the guess that would have been best for a value that took several iterations. */
@@ -825,7 +837,7 @@ static void gaussian_moments_correct(gaussian_moments_lines *line, gaussian_mome
         for (int lane = 0; lane < gaussian_moments_LANES; ++lane) line->y[i][lane] -= delta[i][lane];
 }
 
-/* The largest size; infinite if one is not finite. As integers, the bits of numbers that are not negative have their
+/* The largest of the lanes, which are not negative; infinite if one is not finite. As integers, the bits of numbers that are not negative have their
    order, and those of what is no number are larger. */
 static double gaussian_moments_largest(const gaussian_moments_lanes size)
 {
@@ -835,6 +847,19 @@ static double gaussian_moments_largest(const gaussian_moments_lanes size)
     for (int lane = 0; lane < gaussian_moments_LANES; ++lane) most = bits[lane] > most ? bits[lane] : most;
     memcpy(&largest, &most, sizeof largest);
     return isfinite(largest) ? largest : HUGE_VAL;
+}
+
+/* gaussian_moments_near for the guesses of all lanes, seen from one value. */
+static int gaussian_moments_near_lanes(gaussian_moments_lanes y[restrict 3], const double last[3])
+{
+    gaussian_moments_lanes distance = { 0.0 };
+    double size = 0.0;
+    for (int i = 0; i < 3; ++i) {
+        size += fabs(last[i]);
+        gaussian_moments_EACH_LANE
+        for (int lane = 0; lane < gaussian_moments_LANES; ++lane) distance[lane] += fabs(y[i][lane] - last[i]);
+    }
+    return gaussian_moments_largest(distance) <= 4.0 * size;
 }
 
 /* What is left after a correction of this size: quadratic in it, where the matrices are of the points corrected; where
@@ -961,8 +986,10 @@ static int gaussian_moments_block(gaussian_moments_solver *s, gaussian_moments_t
     double x[3], carry[3], value[3], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
     if (!s->foreseeing) gaussian_moments_march(s, table, line);
-    for (int stage = 0; stage < 1 && s->foreseeing; ++stage)
-        gaussian_moments_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
+    for (int stage = 0; stage < 1; ++stage) {
+        if (s->foreseeing) gaussian_moments_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
+        if (!gaussian_moments_near_lanes(line[stage].y, s->x)) return 0;
+    }
     while (!solved) {
         double size = 0.0;
         const int matrices = previous > 1e-05;
@@ -1196,6 +1223,21 @@ static int gaussian_moments_group_open(gaussian_moments_group *group, const gaus
     return open;
 }
 
+/* The guess for a stage: recurrences, or extrapolation; the state for members where that is not near. */
+static void gaussian_moments_group_predict(gaussian_moments_group *group, int stage, gaussian_moments_lanes y[3])
+{
+    if (group->fitting[stage]) gaussian_moments_group_foresee(group, stage, y);
+    else gaussian_moments_group_extrapolate(group, stage, y);
+    for (int lane = 0; lane < gaussian_moments_LANES; ++lane) {
+        double distance = 0.0, size = 0.0;
+        for (int i = 0; i < 3; ++i) {
+            distance += fabs(y[i][lane] - group->x[i][lane]);
+            size += fabs(group->x[i][lane]);
+        }
+        for (int i = 0; i < 3 && !(distance <= 4.0 * size); ++i) y[i][lane] = group->x[i][lane];
+    }
+}
+
 /* Newton's method for a stage, until the slowest lane is solved. The number of iterations; where that is the most
    allowed, lanes that are not solved leave the group. */
 static int gaussian_moments_group_solve(gaussian_moments_group *group, int stage, gaussian_moments_lines *line)
@@ -1204,8 +1246,7 @@ static int gaussian_moments_group_solve(gaussian_moments_group *group, int stage
     double largest = HUGE_VAL, bend = 0.0;
     int iterations = 0, open = 1;
     for (int lane = 0; lane < gaussian_moments_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
-    if (group->fitting[stage]) gaussian_moments_group_foresee(group, stage, line->y);
-    else gaussian_moments_group_extrapolate(group, stage, line->y);
+    gaussian_moments_group_predict(group, stage, line->y);
     for (; open > 0 && iterations < 20; ++iterations) {
         memcpy(previous, size, sizeof size);
         gaussian_moments_update(group->coef[stage], line, largest > 1e-05);

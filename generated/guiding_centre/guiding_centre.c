@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 9e54a6f104eb5aefddb32f6f672c48c3bd15702b88c6f4119dda977107232952
+ * body-sha256: 6bf2dc4836955b65601d97ea70f1a3db98141e83c814a6fe0d820c7baaea2bf0
  */
 #include "guiding_centre.h"
 
@@ -166,7 +166,19 @@ static int guiding_centre_solve(double matrix[16], double side[4])
     return 1;
 }
 
-/* The guess for the next value (p), from earlier ones; 0 if there are none. */
+/* Whether a guess is where the next values may be. Recurrences that were fitted to little else than rest, near a saddle,
+   may lead anywhere; and far away the equation of a step has solutions that have nothing to do with the motion. */
+static int guiding_centre_near(const double guess[4], const double last[4])
+{
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < 4; ++i) {
+        distance += fabs(guess[i] - last[i]);
+        size += fabs(last[i]);
+    }
+    return distance <= 4.0 * size;
+}
+
+/* The guess for the next value (p), from earlier ones; 0 if there is none. */
 static int guiding_centre_predict(const guiding_centre_memory *memory, double value[4])
 {
     const int last = memory->count - 1;
@@ -185,7 +197,7 @@ static int guiding_centre_predict(const guiding_centre_memory *memory, double va
             for (int i = 0; i < 4; ++i) value[i] += binomial * memory->past[last - k][i];
         }
     }
-    return last >= 0;
+    return last >= 0 && guiding_centre_near(value, memory->past[last]);
 }
 
 /* Choose the guess that would have been best for a value that took several iterations. */

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 6e6a918e541703bee78ea8f845df79dfb30f425d59f4781b01de9fb72e77c0ce
+ * body-sha256: 297f92496f7fb35ecece9cb56ef1b99219fe63a128a2d0c2b3e69afa3a614278
  */
 #include "harmonic_oscillator.h"
 
@@ -124,7 +124,19 @@ static int harmonic_oscillator_solve(double matrix[4], double side[2])
     return 1;
 }
 
-/* The guess for the next value (y), from earlier ones; 0 if there are none. */
+/* Whether a guess is where the next values may be. Recurrences that were fitted to little else than rest, near a saddle,
+   may lead anywhere; and far away the equation of a step has solutions that have nothing to do with the motion. */
+static int harmonic_oscillator_near(const double guess[2], const double last[2])
+{
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < 2; ++i) {
+        distance += fabs(guess[i] - last[i]);
+        size += fabs(last[i]);
+    }
+    return distance <= 4.0 * size;
+}
+
+/* The guess for the next value (y), from earlier ones; 0 if there is none. */
 static int harmonic_oscillator_predict(const harmonic_oscillator_memory *memory, double value[2])
 {
     const int last = memory->count - 1;
@@ -143,7 +155,7 @@ static int harmonic_oscillator_predict(const harmonic_oscillator_memory *memory,
             for (int i = 0; i < 2; ++i) value[i] += binomial * memory->past[last - k][i];
         }
     }
-    return last >= 0;
+    return last >= 0 && harmonic_oscillator_near(value, memory->past[last]);
 }
 
 /* Choose the guess that would have been best for a value that took several iterations. */
@@ -522,7 +534,7 @@ static void harmonic_oscillator_correct(harmonic_oscillator_lines *line, harmoni
         for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane) line->y[i][lane] -= delta[i][lane];
 }
 
-/* The largest size; infinite if one is not finite. As integers, the bits of numbers that are not negative have their
+/* The largest of the lanes, which are not negative; infinite if one is not finite. As integers, the bits of numbers that are not negative have their
    order, and those of what is no number are larger. */
 static double harmonic_oscillator_largest(const harmonic_oscillator_lanes size)
 {
@@ -532,6 +544,19 @@ static double harmonic_oscillator_largest(const harmonic_oscillator_lanes size)
     for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane) most = bits[lane] > most ? bits[lane] : most;
     memcpy(&largest, &most, sizeof largest);
     return isfinite(largest) ? largest : HUGE_VAL;
+}
+
+/* harmonic_oscillator_near for the guesses of all lanes, seen from one value. */
+static int harmonic_oscillator_near_lanes(harmonic_oscillator_lanes y[restrict 2], const double last[2])
+{
+    harmonic_oscillator_lanes distance = { 0.0 };
+    double size = 0.0;
+    for (int i = 0; i < 2; ++i) {
+        size += fabs(last[i]);
+        harmonic_oscillator_EACH_LANE
+        for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane) distance[lane] += fabs(y[i][lane] - last[i]);
+    }
+    return harmonic_oscillator_largest(distance) <= 4.0 * size;
 }
 
 /* What is left after a correction of this size: quadratic in it, where the matrices are of the points corrected; where
@@ -658,8 +683,10 @@ static int harmonic_oscillator_block(harmonic_oscillator_solver *s, harmonic_osc
     double x[2], carry[2], value[2], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
     if (!s->foreseeing) harmonic_oscillator_march(s, table, line);
-    for (int stage = 0; stage < 1 && s->foreseeing; ++stage)
-        harmonic_oscillator_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
+    for (int stage = 0; stage < 1; ++stage) {
+        if (s->foreseeing) harmonic_oscillator_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
+        if (!harmonic_oscillator_near_lanes(line[stage].y, s->x)) return 0;
+    }
     while (!solved) {
         double size = 0.0;
         const int matrices = previous > 1e-05;
@@ -893,6 +920,21 @@ static int harmonic_oscillator_group_open(harmonic_oscillator_group *group, cons
     return open;
 }
 
+/* The guess for a stage: recurrences, or extrapolation; the state for members where that is not near. */
+static void harmonic_oscillator_group_predict(harmonic_oscillator_group *group, int stage, harmonic_oscillator_lanes y[2])
+{
+    if (group->fitting[stage]) harmonic_oscillator_group_foresee(group, stage, y);
+    else harmonic_oscillator_group_extrapolate(group, stage, y);
+    for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane) {
+        double distance = 0.0, size = 0.0;
+        for (int i = 0; i < 2; ++i) {
+            distance += fabs(y[i][lane] - group->x[i][lane]);
+            size += fabs(group->x[i][lane]);
+        }
+        for (int i = 0; i < 2 && !(distance <= 4.0 * size); ++i) y[i][lane] = group->x[i][lane];
+    }
+}
+
 /* Newton's method for a stage, until the slowest lane is solved. The number of iterations; where that is the most
    allowed, lanes that are not solved leave the group. */
 static int harmonic_oscillator_group_solve(harmonic_oscillator_group *group, int stage, harmonic_oscillator_lines *line)
@@ -901,8 +943,7 @@ static int harmonic_oscillator_group_solve(harmonic_oscillator_group *group, int
     double largest = HUGE_VAL, bend = 0.0;
     int iterations = 0, open = 1;
     for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
-    if (group->fitting[stage]) harmonic_oscillator_group_foresee(group, stage, line->y);
-    else harmonic_oscillator_group_extrapolate(group, stage, line->y);
+    harmonic_oscillator_group_predict(group, stage, line->y);
     for (; open > 0 && iterations < 20; ++iterations) {
         memcpy(previous, size, sizeof size);
         harmonic_oscillator_update(group->coef[stage], line, largest > 1e-05);

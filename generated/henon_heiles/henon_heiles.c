@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 1bda4242603bdaf985b59e9e51e0601bc4941f9ef0fc5051abe27a0e56d9d728
+ * body-sha256: 87d6fd6535241b1d00e58f98f8f36d9cb926807e104b7a7c051b1c73efee6c20
  */
 #include "henon_heiles.h"
 
@@ -228,7 +228,19 @@ static int henon_heiles_solve(double matrix[16], double side[4])
     return 1;
 }
 
-/* The guess for the next value (y), from earlier ones; 0 if there are none. */
+/* Whether a guess is where the next values may be. Recurrences that were fitted to little else than rest, near a saddle,
+   may lead anywhere; and far away the equation of a step has solutions that have nothing to do with the motion. */
+static int henon_heiles_near(const double guess[4], const double last[4])
+{
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < 4; ++i) {
+        distance += fabs(guess[i] - last[i]);
+        size += fabs(last[i]);
+    }
+    return distance <= 4.0 * size;
+}
+
+/* The guess for the next value (y), from earlier ones; 0 if there is none. */
 static int henon_heiles_predict(const henon_heiles_memory *memory, double value[4])
 {
     const int last = memory->count - 1;
@@ -247,7 +259,7 @@ static int henon_heiles_predict(const henon_heiles_memory *memory, double value[
             for (int i = 0; i < 4; ++i) value[i] += binomial * memory->past[last - k][i];
         }
     }
-    return last >= 0;
+    return last >= 0 && henon_heiles_near(value, memory->past[last]);
 }
 
 /* Choose the guess that would have been best for a value that took several iterations. */
@@ -754,7 +766,7 @@ static void henon_heiles_correct(henon_heiles_lines *line, henon_heiles_lanes si
         for (int lane = 0; lane < henon_heiles_LANES; ++lane) line->y[i][lane] -= delta[i][lane];
 }
 
-/* The largest size; infinite if one is not finite. As integers, the bits of numbers that are not negative have their
+/* The largest of the lanes, which are not negative; infinite if one is not finite. As integers, the bits of numbers that are not negative have their
    order, and those of what is no number are larger. */
 static double henon_heiles_largest(const henon_heiles_lanes size)
 {
@@ -764,6 +776,19 @@ static double henon_heiles_largest(const henon_heiles_lanes size)
     for (int lane = 0; lane < henon_heiles_LANES; ++lane) most = bits[lane] > most ? bits[lane] : most;
     memcpy(&largest, &most, sizeof largest);
     return isfinite(largest) ? largest : HUGE_VAL;
+}
+
+/* henon_heiles_near for the guesses of all lanes, seen from one value. */
+static int henon_heiles_near_lanes(henon_heiles_lanes y[restrict 4], const double last[4])
+{
+    henon_heiles_lanes distance = { 0.0 };
+    double size = 0.0;
+    for (int i = 0; i < 4; ++i) {
+        size += fabs(last[i]);
+        henon_heiles_EACH_LANE
+        for (int lane = 0; lane < henon_heiles_LANES; ++lane) distance[lane] += fabs(y[i][lane] - last[i]);
+    }
+    return henon_heiles_largest(distance) <= 4.0 * size;
 }
 
 /* What is left after a correction of this size: quadratic in it, where the matrices are of the points corrected; where
@@ -890,8 +915,10 @@ static int henon_heiles_block(henon_heiles_solver *s, henon_heiles_table *table,
     double x[4], carry[4], value[4], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
     if (!s->foreseeing) henon_heiles_march(s, table, line);
-    for (int stage = 0; stage < 1 && s->foreseeing; ++stage)
-        henon_heiles_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
+    for (int stage = 0; stage < 1; ++stage) {
+        if (s->foreseeing) henon_heiles_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
+        if (!henon_heiles_near_lanes(line[stage].y, s->x)) return 0;
+    }
     while (!solved) {
         double size = 0.0;
         const int matrices = previous > 1e-05;
@@ -1125,6 +1152,21 @@ static int henon_heiles_group_open(henon_heiles_group *group, const henon_heiles
     return open;
 }
 
+/* The guess for a stage: recurrences, or extrapolation; the state for members where that is not near. */
+static void henon_heiles_group_predict(henon_heiles_group *group, int stage, henon_heiles_lanes y[4])
+{
+    if (group->fitting[stage]) henon_heiles_group_foresee(group, stage, y);
+    else henon_heiles_group_extrapolate(group, stage, y);
+    for (int lane = 0; lane < henon_heiles_LANES; ++lane) {
+        double distance = 0.0, size = 0.0;
+        for (int i = 0; i < 4; ++i) {
+            distance += fabs(y[i][lane] - group->x[i][lane]);
+            size += fabs(group->x[i][lane]);
+        }
+        for (int i = 0; i < 4 && !(distance <= 4.0 * size); ++i) y[i][lane] = group->x[i][lane];
+    }
+}
+
 /* Newton's method for a stage, until the slowest lane is solved. The number of iterations; where that is the most
    allowed, lanes that are not solved leave the group. */
 static int henon_heiles_group_solve(henon_heiles_group *group, int stage, henon_heiles_lines *line)
@@ -1133,8 +1175,7 @@ static int henon_heiles_group_solve(henon_heiles_group *group, int stage, henon_
     double largest = HUGE_VAL, bend = 0.0;
     int iterations = 0, open = 1;
     for (int lane = 0; lane < henon_heiles_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
-    if (group->fitting[stage]) henon_heiles_group_foresee(group, stage, line->y);
-    else henon_heiles_group_extrapolate(group, stage, line->y);
+    henon_heiles_group_predict(group, stage, line->y);
     for (; open > 0 && iterations < 20; ++iterations) {
         memcpy(previous, size, sizeof size);
         henon_heiles_update(group->coef[stage], line, largest > 1e-05);

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: fb80d5e6e87ed90c018bb224bcf4924ff62437ebe85b1b136e6baa094f66e82c
+ * body-sha256: 9248d0352c0f320a89e45bf7b11310c31a99518183ab777247ba7e06a6a88364
  */
 #include "kepler.h"
 
@@ -539,7 +539,19 @@ static int kepler_solve(double matrix[16], double side[4])
     return 1;
 }
 
-/* The guess for the next value (y), from earlier ones; 0 if there are none. */
+/* Whether a guess is where the next values may be. Recurrences that were fitted to little else than rest, near a saddle,
+   may lead anywhere; and far away the equation of a step has solutions that have nothing to do with the motion. */
+static int kepler_near(const double guess[4], const double last[4])
+{
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < 4; ++i) {
+        distance += fabs(guess[i] - last[i]);
+        size += fabs(last[i]);
+    }
+    return distance <= 4.0 * size;
+}
+
+/* The guess for the next value (y), from earlier ones; 0 if there is none. */
 static int kepler_predict(const kepler_memory *memory, double value[4])
 {
     const int last = memory->count - 1;
@@ -558,7 +570,7 @@ static int kepler_predict(const kepler_memory *memory, double value[4])
             for (int i = 0; i < 4; ++i) value[i] += binomial * memory->past[last - k][i];
         }
     }
-    return last >= 0;
+    return last >= 0 && kepler_near(value, memory->past[last]);
 }
 
 /* Choose the guess that would have been best for a value that took several iterations. */
@@ -1276,7 +1288,7 @@ static void kepler_correct(kepler_lines *line, kepler_lanes size)
         for (int lane = 0; lane < kepler_LANES; ++lane) line->y[i][lane] -= delta[i][lane];
 }
 
-/* The largest size; infinite if one is not finite. As integers, the bits of numbers that are not negative have their
+/* The largest of the lanes, which are not negative; infinite if one is not finite. As integers, the bits of numbers that are not negative have their
    order, and those of what is no number are larger. */
 static double kepler_largest(const kepler_lanes size)
 {
@@ -1286,6 +1298,19 @@ static double kepler_largest(const kepler_lanes size)
     for (int lane = 0; lane < kepler_LANES; ++lane) most = bits[lane] > most ? bits[lane] : most;
     memcpy(&largest, &most, sizeof largest);
     return isfinite(largest) ? largest : HUGE_VAL;
+}
+
+/* kepler_near for the guesses of all lanes, seen from one value. */
+static int kepler_near_lanes(kepler_lanes y[restrict 4], const double last[4])
+{
+    kepler_lanes distance = { 0.0 };
+    double size = 0.0;
+    for (int i = 0; i < 4; ++i) {
+        size += fabs(last[i]);
+        kepler_EACH_LANE
+        for (int lane = 0; lane < kepler_LANES; ++lane) distance[lane] += fabs(y[i][lane] - last[i]);
+    }
+    return kepler_largest(distance) <= 4.0 * size;
 }
 
 /* What is left after a correction of this size: quadratic in it, where the matrices are of the points corrected; where
@@ -1412,8 +1437,10 @@ static int kepler_block(kepler_solver *s, kepler_table *table, int most)
     double x[4], carry[4], value[4], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
     if (!s->foreseeing) kepler_march(s, table, line);
-    for (int stage = 0; stage < 1 && s->foreseeing; ++stage)
-        kepler_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
+    for (int stage = 0; stage < 1; ++stage) {
+        if (s->foreseeing) kepler_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
+        if (!kepler_near_lanes(line[stage].y, s->x)) return 0;
+    }
     while (!solved) {
         double size = 0.0;
         const int matrices = previous > 1e-05;
@@ -1647,6 +1674,21 @@ static int kepler_group_open(kepler_group *group, const kepler_lanes size, const
     return open;
 }
 
+/* The guess for a stage: recurrences, or extrapolation; the state for members where that is not near. */
+static void kepler_group_predict(kepler_group *group, int stage, kepler_lanes y[4])
+{
+    if (group->fitting[stage]) kepler_group_foresee(group, stage, y);
+    else kepler_group_extrapolate(group, stage, y);
+    for (int lane = 0; lane < kepler_LANES; ++lane) {
+        double distance = 0.0, size = 0.0;
+        for (int i = 0; i < 4; ++i) {
+            distance += fabs(y[i][lane] - group->x[i][lane]);
+            size += fabs(group->x[i][lane]);
+        }
+        for (int i = 0; i < 4 && !(distance <= 4.0 * size); ++i) y[i][lane] = group->x[i][lane];
+    }
+}
+
 /* Newton's method for a stage, until the slowest lane is solved. The number of iterations; where that is the most
    allowed, lanes that are not solved leave the group. */
 static int kepler_group_solve(kepler_group *group, int stage, kepler_lines *line)
@@ -1655,8 +1697,7 @@ static int kepler_group_solve(kepler_group *group, int stage, kepler_lines *line
     double largest = HUGE_VAL, bend = 0.0;
     int iterations = 0, open = 1;
     for (int lane = 0; lane < kepler_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
-    if (group->fitting[stage]) kepler_group_foresee(group, stage, line->y);
-    else kepler_group_extrapolate(group, stage, line->y);
+    kepler_group_predict(group, stage, line->y);
     for (; open > 0 && iterations < 20; ++iterations) {
         memcpy(previous, size, sizeof size);
         kepler_update(group->coef[stage], line, largest > 1e-05);

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: aa6edabb46ed905de75527e3708de402af07d39a9ef959671627205da35df898
+ * body-sha256: 64bb006fd010ad54414410569b71708d262388170372cbd7020c9336061b1953
  */
 #include "lagrange_top.h"
 
@@ -646,7 +646,19 @@ static int lagrange_top_solve(double matrix[36], double side[6])
     return 1;
 }
 
-/* The guess for the next value (y), from earlier ones; 0 if there are none. */
+/* Whether a guess is where the next values may be. Recurrences that were fitted to little else than rest, near a saddle,
+   may lead anywhere; and far away the equation of a step has solutions that have nothing to do with the motion. */
+static int lagrange_top_near(const double guess[6], const double last[6])
+{
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < 6; ++i) {
+        distance += fabs(guess[i] - last[i]);
+        size += fabs(last[i]);
+    }
+    return distance <= 4.0 * size;
+}
+
+/* The guess for the next value (y), from earlier ones; 0 if there is none. */
 static int lagrange_top_predict(const lagrange_top_memory *memory, double value[6])
 {
     const int last = memory->count - 1;
@@ -665,7 +677,7 @@ static int lagrange_top_predict(const lagrange_top_memory *memory, double value[
             for (int i = 0; i < 6; ++i) value[i] += binomial * memory->past[last - k][i];
         }
     }
-    return last >= 0;
+    return last >= 0 && lagrange_top_near(value, memory->past[last]);
 }
 
 /* Choose the guess that would have been best for a value that took several iterations. */
@@ -1555,7 +1567,7 @@ static void lagrange_top_correct(lagrange_top_lines *line, lagrange_top_lanes si
         for (int lane = 0; lane < lagrange_top_LANES; ++lane) line->y[i][lane] -= delta[i][lane];
 }
 
-/* The largest size; infinite if one is not finite. As integers, the bits of numbers that are not negative have their
+/* The largest of the lanes, which are not negative; infinite if one is not finite. As integers, the bits of numbers that are not negative have their
    order, and those of what is no number are larger. */
 static double lagrange_top_largest(const lagrange_top_lanes size)
 {
@@ -1565,6 +1577,19 @@ static double lagrange_top_largest(const lagrange_top_lanes size)
     for (int lane = 0; lane < lagrange_top_LANES; ++lane) most = bits[lane] > most ? bits[lane] : most;
     memcpy(&largest, &most, sizeof largest);
     return isfinite(largest) ? largest : HUGE_VAL;
+}
+
+/* lagrange_top_near for the guesses of all lanes, seen from one value. */
+static int lagrange_top_near_lanes(lagrange_top_lanes y[restrict 6], const double last[6])
+{
+    lagrange_top_lanes distance = { 0.0 };
+    double size = 0.0;
+    for (int i = 0; i < 6; ++i) {
+        size += fabs(last[i]);
+        lagrange_top_EACH_LANE
+        for (int lane = 0; lane < lagrange_top_LANES; ++lane) distance[lane] += fabs(y[i][lane] - last[i]);
+    }
+    return lagrange_top_largest(distance) <= 4.0 * size;
 }
 
 /* What is left after a correction of this size: quadratic in it, where the matrices are of the points corrected; where
@@ -1691,8 +1716,10 @@ static int lagrange_top_block(lagrange_top_solver *s, lagrange_top_table *table,
     double x[6], carry[6], value[6], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
     if (!s->foreseeing) lagrange_top_march(s, table, line);
-    for (int stage = 0; stage < 1 && s->foreseeing; ++stage)
-        lagrange_top_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
+    for (int stage = 0; stage < 1; ++stage) {
+        if (s->foreseeing) lagrange_top_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
+        if (!lagrange_top_near_lanes(line[stage].y, s->x)) return 0;
+    }
     while (!solved) {
         double size = 0.0;
         const int matrices = previous > 1e-05;
@@ -1926,6 +1953,21 @@ static int lagrange_top_group_open(lagrange_top_group *group, const lagrange_top
     return open;
 }
 
+/* The guess for a stage: recurrences, or extrapolation; the state for members where that is not near. */
+static void lagrange_top_group_predict(lagrange_top_group *group, int stage, lagrange_top_lanes y[6])
+{
+    if (group->fitting[stage]) lagrange_top_group_foresee(group, stage, y);
+    else lagrange_top_group_extrapolate(group, stage, y);
+    for (int lane = 0; lane < lagrange_top_LANES; ++lane) {
+        double distance = 0.0, size = 0.0;
+        for (int i = 0; i < 6; ++i) {
+            distance += fabs(y[i][lane] - group->x[i][lane]);
+            size += fabs(group->x[i][lane]);
+        }
+        for (int i = 0; i < 6 && !(distance <= 4.0 * size); ++i) y[i][lane] = group->x[i][lane];
+    }
+}
+
 /* Newton's method for a stage, until the slowest lane is solved. The number of iterations; where that is the most
    allowed, lanes that are not solved leave the group. */
 static int lagrange_top_group_solve(lagrange_top_group *group, int stage, lagrange_top_lines *line)
@@ -1934,8 +1976,7 @@ static int lagrange_top_group_solve(lagrange_top_group *group, int stage, lagran
     double largest = HUGE_VAL, bend = 0.0;
     int iterations = 0, open = 1;
     for (int lane = 0; lane < lagrange_top_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
-    if (group->fitting[stage]) lagrange_top_group_foresee(group, stage, line->y);
-    else lagrange_top_group_extrapolate(group, stage, line->y);
+    lagrange_top_group_predict(group, stage, line->y);
     for (; open > 0 && iterations < 20; ++iterations) {
         memcpy(previous, size, sizeof size);
         lagrange_top_update(group->coef[stage], line, largest > 1e-05);

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: dc8f87515282c61fafbd2e54ae7d70390a72d9875eda0a095e9b539207fce4e3
+ * body-sha256: a07934ad68bb0acb43b2ae1970978d469fabda3c9e3f43d65a107412d730d020
  */
 #include "lotka_volterra.h"
 
@@ -163,7 +163,19 @@ static int lotka_volterra_solve(double matrix[9], double side[3])
     return 1;
 }
 
-/* The guess for the next value (y), from earlier ones; 0 if there are none. */
+/* Whether a guess is where the next values may be. Recurrences that were fitted to little else than rest, near a saddle,
+   may lead anywhere; and far away the equation of a step has solutions that have nothing to do with the motion. */
+static int lotka_volterra_near(const double guess[3], const double last[3])
+{
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < 3; ++i) {
+        distance += fabs(guess[i] - last[i]);
+        size += fabs(last[i]);
+    }
+    return distance <= 4.0 * size;
+}
+
+/* The guess for the next value (y), from earlier ones; 0 if there is none. */
 static int lotka_volterra_predict(const lotka_volterra_memory *memory, double value[3])
 {
     const int last = memory->count - 1;
@@ -182,7 +194,7 @@ static int lotka_volterra_predict(const lotka_volterra_memory *memory, double va
             for (int i = 0; i < 3; ++i) value[i] += binomial * memory->past[last - k][i];
         }
     }
-    return last >= 0;
+    return last >= 0 && lotka_volterra_near(value, memory->past[last]);
 }
 
 /* Choose the guess that would have been best for a value that took several iterations. */
@@ -653,7 +665,7 @@ static void lotka_volterra_correct(lotka_volterra_lines *line, lotka_volterra_la
         for (int lane = 0; lane < lotka_volterra_LANES; ++lane) line->y[i][lane] -= delta[i][lane];
 }
 
-/* The largest size; infinite if one is not finite. As integers, the bits of numbers that are not negative have their
+/* The largest of the lanes, which are not negative; infinite if one is not finite. As integers, the bits of numbers that are not negative have their
    order, and those of what is no number are larger. */
 static double lotka_volterra_largest(const lotka_volterra_lanes size)
 {
@@ -663,6 +675,19 @@ static double lotka_volterra_largest(const lotka_volterra_lanes size)
     for (int lane = 0; lane < lotka_volterra_LANES; ++lane) most = bits[lane] > most ? bits[lane] : most;
     memcpy(&largest, &most, sizeof largest);
     return isfinite(largest) ? largest : HUGE_VAL;
+}
+
+/* lotka_volterra_near for the guesses of all lanes, seen from one value. */
+static int lotka_volterra_near_lanes(lotka_volterra_lanes y[restrict 3], const double last[3])
+{
+    lotka_volterra_lanes distance = { 0.0 };
+    double size = 0.0;
+    for (int i = 0; i < 3; ++i) {
+        size += fabs(last[i]);
+        lotka_volterra_EACH_LANE
+        for (int lane = 0; lane < lotka_volterra_LANES; ++lane) distance[lane] += fabs(y[i][lane] - last[i]);
+    }
+    return lotka_volterra_largest(distance) <= 4.0 * size;
 }
 
 /* What is left after a correction of this size: quadratic in it, where the matrices are of the points corrected; where
@@ -789,8 +814,10 @@ static int lotka_volterra_block(lotka_volterra_solver *s, lotka_volterra_table *
     double x[3], carry[3], value[3], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
     if (!s->foreseeing) lotka_volterra_march(s, table, line);
-    for (int stage = 0; stage < 1 && s->foreseeing; ++stage)
-        lotka_volterra_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
+    for (int stage = 0; stage < 1; ++stage) {
+        if (s->foreseeing) lotka_volterra_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
+        if (!lotka_volterra_near_lanes(line[stage].y, s->x)) return 0;
+    }
     while (!solved) {
         double size = 0.0;
         const int matrices = previous > 1e-05;
@@ -1024,6 +1051,21 @@ static int lotka_volterra_group_open(lotka_volterra_group *group, const lotka_vo
     return open;
 }
 
+/* The guess for a stage: recurrences, or extrapolation; the state for members where that is not near. */
+static void lotka_volterra_group_predict(lotka_volterra_group *group, int stage, lotka_volterra_lanes y[3])
+{
+    if (group->fitting[stage]) lotka_volterra_group_foresee(group, stage, y);
+    else lotka_volterra_group_extrapolate(group, stage, y);
+    for (int lane = 0; lane < lotka_volterra_LANES; ++lane) {
+        double distance = 0.0, size = 0.0;
+        for (int i = 0; i < 3; ++i) {
+            distance += fabs(y[i][lane] - group->x[i][lane]);
+            size += fabs(group->x[i][lane]);
+        }
+        for (int i = 0; i < 3 && !(distance <= 4.0 * size); ++i) y[i][lane] = group->x[i][lane];
+    }
+}
+
 /* Newton's method for a stage, until the slowest lane is solved. The number of iterations; where that is the most
    allowed, lanes that are not solved leave the group. */
 static int lotka_volterra_group_solve(lotka_volterra_group *group, int stage, lotka_volterra_lines *line)
@@ -1032,8 +1074,7 @@ static int lotka_volterra_group_solve(lotka_volterra_group *group, int stage, lo
     double largest = HUGE_VAL, bend = 0.0;
     int iterations = 0, open = 1;
     for (int lane = 0; lane < lotka_volterra_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
-    if (group->fitting[stage]) lotka_volterra_group_foresee(group, stage, line->y);
-    else lotka_volterra_group_extrapolate(group, stage, line->y);
+    lotka_volterra_group_predict(group, stage, line->y);
     for (; open > 0 && iterations < 20; ++iterations) {
         memcpy(previous, size, sizeof size);
         lotka_volterra_update(group->coef[stage], line, largest > 1e-05);

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 77c0311b3b4848caa157a6f4e207927701cf77e3dd873820bbb301e74f04c629
+ * body-sha256: 55f9e6605d303a5828e3f7190c3f475b99e8868a5a2f99b81af6124f09adfdd4
  */
 #include "maxwell_bloch.h"
 
@@ -152,7 +152,19 @@ static int maxwell_bloch_solve(double matrix[9], double side[3])
     return 1;
 }
 
-/* The guess for the next value (y), from earlier ones; 0 if there are none. */
+/* Whether a guess is where the next values may be. Recurrences that were fitted to little else than rest, near a saddle,
+   may lead anywhere; and far away the equation of a step has solutions that have nothing to do with the motion. */
+static int maxwell_bloch_near(const double guess[3], const double last[3])
+{
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < 3; ++i) {
+        distance += fabs(guess[i] - last[i]);
+        size += fabs(last[i]);
+    }
+    return distance <= 4.0 * size;
+}
+
+/* The guess for the next value (y), from earlier ones; 0 if there is none. */
 static int maxwell_bloch_predict(const maxwell_bloch_memory *memory, double value[3])
 {
     const int last = memory->count - 1;
@@ -171,7 +183,7 @@ static int maxwell_bloch_predict(const maxwell_bloch_memory *memory, double valu
             for (int i = 0; i < 3; ++i) value[i] += binomial * memory->past[last - k][i];
         }
     }
-    return last >= 0;
+    return last >= 0 && maxwell_bloch_near(value, memory->past[last]);
 }
 
 /* Choose the guess that would have been best for a value that took several iterations. */
@@ -603,7 +615,7 @@ static void maxwell_bloch_correct(maxwell_bloch_lines *line, maxwell_bloch_lanes
         for (int lane = 0; lane < maxwell_bloch_LANES; ++lane) line->y[i][lane] -= delta[i][lane];
 }
 
-/* The largest size; infinite if one is not finite. As integers, the bits of numbers that are not negative have their
+/* The largest of the lanes, which are not negative; infinite if one is not finite. As integers, the bits of numbers that are not negative have their
    order, and those of what is no number are larger. */
 static double maxwell_bloch_largest(const maxwell_bloch_lanes size)
 {
@@ -613,6 +625,19 @@ static double maxwell_bloch_largest(const maxwell_bloch_lanes size)
     for (int lane = 0; lane < maxwell_bloch_LANES; ++lane) most = bits[lane] > most ? bits[lane] : most;
     memcpy(&largest, &most, sizeof largest);
     return isfinite(largest) ? largest : HUGE_VAL;
+}
+
+/* maxwell_bloch_near for the guesses of all lanes, seen from one value. */
+static int maxwell_bloch_near_lanes(maxwell_bloch_lanes y[restrict 3], const double last[3])
+{
+    maxwell_bloch_lanes distance = { 0.0 };
+    double size = 0.0;
+    for (int i = 0; i < 3; ++i) {
+        size += fabs(last[i]);
+        maxwell_bloch_EACH_LANE
+        for (int lane = 0; lane < maxwell_bloch_LANES; ++lane) distance[lane] += fabs(y[i][lane] - last[i]);
+    }
+    return maxwell_bloch_largest(distance) <= 4.0 * size;
 }
 
 /* What is left after a correction of this size: quadratic in it, where the matrices are of the points corrected; where
@@ -739,8 +764,10 @@ static int maxwell_bloch_block(maxwell_bloch_solver *s, maxwell_bloch_table *tab
     double x[3], carry[3], value[3], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
     if (!s->foreseeing) maxwell_bloch_march(s, table, line);
-    for (int stage = 0; stage < 1 && s->foreseeing; ++stage)
-        maxwell_bloch_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
+    for (int stage = 0; stage < 1; ++stage) {
+        if (s->foreseeing) maxwell_bloch_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
+        if (!maxwell_bloch_near_lanes(line[stage].y, s->x)) return 0;
+    }
     while (!solved) {
         double size = 0.0;
         const int matrices = previous > 1e-05;
@@ -974,6 +1001,21 @@ static int maxwell_bloch_group_open(maxwell_bloch_group *group, const maxwell_bl
     return open;
 }
 
+/* The guess for a stage: recurrences, or extrapolation; the state for members where that is not near. */
+static void maxwell_bloch_group_predict(maxwell_bloch_group *group, int stage, maxwell_bloch_lanes y[3])
+{
+    if (group->fitting[stage]) maxwell_bloch_group_foresee(group, stage, y);
+    else maxwell_bloch_group_extrapolate(group, stage, y);
+    for (int lane = 0; lane < maxwell_bloch_LANES; ++lane) {
+        double distance = 0.0, size = 0.0;
+        for (int i = 0; i < 3; ++i) {
+            distance += fabs(y[i][lane] - group->x[i][lane]);
+            size += fabs(group->x[i][lane]);
+        }
+        for (int i = 0; i < 3 && !(distance <= 4.0 * size); ++i) y[i][lane] = group->x[i][lane];
+    }
+}
+
 /* Newton's method for a stage, until the slowest lane is solved. The number of iterations; where that is the most
    allowed, lanes that are not solved leave the group. */
 static int maxwell_bloch_group_solve(maxwell_bloch_group *group, int stage, maxwell_bloch_lines *line)
@@ -982,8 +1024,7 @@ static int maxwell_bloch_group_solve(maxwell_bloch_group *group, int stage, maxw
     double largest = HUGE_VAL, bend = 0.0;
     int iterations = 0, open = 1;
     for (int lane = 0; lane < maxwell_bloch_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
-    if (group->fitting[stage]) maxwell_bloch_group_foresee(group, stage, line->y);
-    else maxwell_bloch_group_extrapolate(group, stage, line->y);
+    maxwell_bloch_group_predict(group, stage, line->y);
     for (; open > 0 && iterations < 20; ++iterations) {
         memcpy(previous, size, sizeof size);
         maxwell_bloch_update(group->coef[stage], line, largest > 1e-05);

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 25aa50af0b74f503540c943df2131d5fd2fd6c725eb21641fac9ccaaf60d023b
+ * body-sha256: b31606a039043dfe2d092e5bb3af9a9b6458d032de87de02404c397f250692da
  */
 #include "nambu_pendulum.h"
 
@@ -124,7 +124,19 @@ static int nambu_pendulum_solve(double matrix[9], double side[3])
     return 1;
 }
 
-/* The guess for the next value (p), from earlier ones; 0 if there are none. */
+/* Whether a guess is where the next values may be. Recurrences that were fitted to little else than rest, near a saddle,
+   may lead anywhere; and far away the equation of a step has solutions that have nothing to do with the motion. */
+static int nambu_pendulum_near(const double guess[3], const double last[3])
+{
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < 3; ++i) {
+        distance += fabs(guess[i] - last[i]);
+        size += fabs(last[i]);
+    }
+    return distance <= 4.0 * size;
+}
+
+/* The guess for the next value (p), from earlier ones; 0 if there is none. */
 static int nambu_pendulum_predict(const nambu_pendulum_memory *memory, double value[3])
 {
     const int last = memory->count - 1;
@@ -143,7 +155,7 @@ static int nambu_pendulum_predict(const nambu_pendulum_memory *memory, double va
             for (int i = 0; i < 3; ++i) value[i] += binomial * memory->past[last - k][i];
         }
     }
-    return last >= 0;
+    return last >= 0 && nambu_pendulum_near(value, memory->past[last]);
 }
 
 /* Choose the guess that would have been best for a value that took several iterations. */

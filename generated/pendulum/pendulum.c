@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 6fdb16fd1d6ea4f990998b7375aceb3bd1afebdc69df646d17c37db76ad534c2
+ * body-sha256: ee959776c61909fa15d434989ae3314cd7b447697ae18a1152894401316480d2
  */
 #include "pendulum.h"
 
@@ -157,7 +157,19 @@ static int pendulum_solve(double matrix[4], double side[2])
     return 1;
 }
 
-/* The guess for the next value (y), from earlier ones; 0 if there are none. */
+/* Whether a guess is where the next values may be. Recurrences that were fitted to little else than rest, near a saddle,
+   may lead anywhere; and far away the equation of a step has solutions that have nothing to do with the motion. */
+static int pendulum_near(const double guess[2], const double last[2])
+{
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < 2; ++i) {
+        distance += fabs(guess[i] - last[i]);
+        size += fabs(last[i]);
+    }
+    return distance <= 4.0 * size;
+}
+
+/* The guess for the next value (y), from earlier ones; 0 if there is none. */
 static int pendulum_predict(const pendulum_memory *memory, double value[2])
 {
     const int last = memory->count - 1;
@@ -176,7 +188,7 @@ static int pendulum_predict(const pendulum_memory *memory, double value[2])
             for (int i = 0; i < 2; ++i) value[i] += binomial * memory->past[last - k][i];
         }
     }
-    return last >= 0;
+    return last >= 0 && pendulum_near(value, memory->past[last]);
 }
 
 /* Choose the guess that would have been best for a value that took several iterations. */
@@ -616,7 +628,7 @@ static void pendulum_correct(pendulum_lines *line, pendulum_lanes size)
         for (int lane = 0; lane < pendulum_LANES; ++lane) line->y[i][lane] -= delta[i][lane];
 }
 
-/* The largest size; infinite if one is not finite. As integers, the bits of numbers that are not negative have their
+/* The largest of the lanes, which are not negative; infinite if one is not finite. As integers, the bits of numbers that are not negative have their
    order, and those of what is no number are larger. */
 static double pendulum_largest(const pendulum_lanes size)
 {
@@ -626,6 +638,19 @@ static double pendulum_largest(const pendulum_lanes size)
     for (int lane = 0; lane < pendulum_LANES; ++lane) most = bits[lane] > most ? bits[lane] : most;
     memcpy(&largest, &most, sizeof largest);
     return isfinite(largest) ? largest : HUGE_VAL;
+}
+
+/* pendulum_near for the guesses of all lanes, seen from one value. */
+static int pendulum_near_lanes(pendulum_lanes y[restrict 2], const double last[2])
+{
+    pendulum_lanes distance = { 0.0 };
+    double size = 0.0;
+    for (int i = 0; i < 2; ++i) {
+        size += fabs(last[i]);
+        pendulum_EACH_LANE
+        for (int lane = 0; lane < pendulum_LANES; ++lane) distance[lane] += fabs(y[i][lane] - last[i]);
+    }
+    return pendulum_largest(distance) <= 4.0 * size;
 }
 
 /* What is left after a correction of this size: quadratic in it, where the matrices are of the points corrected; where
@@ -752,8 +777,10 @@ static int pendulum_block(pendulum_solver *s, pendulum_table *table, int most)
     double x[2], carry[2], value[2], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
     if (!s->foreseeing) pendulum_march(s, table, line);
-    for (int stage = 0; stage < 1 && s->foreseeing; ++stage)
-        pendulum_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
+    for (int stage = 0; stage < 1; ++stage) {
+        if (s->foreseeing) pendulum_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
+        if (!pendulum_near_lanes(line[stage].y, s->x)) return 0;
+    }
     while (!solved) {
         double size = 0.0;
         const int matrices = previous > 1e-05;
@@ -987,6 +1014,21 @@ static int pendulum_group_open(pendulum_group *group, const pendulum_lanes size,
     return open;
 }
 
+/* The guess for a stage: recurrences, or extrapolation; the state for members where that is not near. */
+static void pendulum_group_predict(pendulum_group *group, int stage, pendulum_lanes y[2])
+{
+    if (group->fitting[stage]) pendulum_group_foresee(group, stage, y);
+    else pendulum_group_extrapolate(group, stage, y);
+    for (int lane = 0; lane < pendulum_LANES; ++lane) {
+        double distance = 0.0, size = 0.0;
+        for (int i = 0; i < 2; ++i) {
+            distance += fabs(y[i][lane] - group->x[i][lane]);
+            size += fabs(group->x[i][lane]);
+        }
+        for (int i = 0; i < 2 && !(distance <= 4.0 * size); ++i) y[i][lane] = group->x[i][lane];
+    }
+}
+
 /* Newton's method for a stage, until the slowest lane is solved. The number of iterations; where that is the most
    allowed, lanes that are not solved leave the group. */
 static int pendulum_group_solve(pendulum_group *group, int stage, pendulum_lines *line)
@@ -995,8 +1037,7 @@ static int pendulum_group_solve(pendulum_group *group, int stage, pendulum_lines
     double largest = HUGE_VAL, bend = 0.0;
     int iterations = 0, open = 1;
     for (int lane = 0; lane < pendulum_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
-    if (group->fitting[stage]) pendulum_group_foresee(group, stage, line->y);
-    else pendulum_group_extrapolate(group, stage, line->y);
+    pendulum_group_predict(group, stage, line->y);
     for (; open > 0 && iterations < 20; ++iterations) {
         memcpy(previous, size, sizeof size);
         pendulum_update(group->coef[stage], line, largest > 1e-05);

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 9b2ecbed809e466182bddc55e9e34f51a80a159456398a4380e8c65174f27249
+ * body-sha256: e3ae7a3aa0acbf339b7a4652883a399f1623202e4914dd7a23920f209d7ff31a
  */
 #include "poisson_not_hamiltonian.h"
 
@@ -260,7 +260,19 @@ static int poisson_not_hamiltonian_solve(double matrix[9], double side[3])
     return 1;
 }
 
-/* The guess for the next value (y), from earlier ones; 0 if there are none. */
+/* Whether a guess is where the next values may be. Recurrences that were fitted to little else than rest, near a saddle,
+   may lead anywhere; and far away the equation of a step has solutions that have nothing to do with the motion. */
+static int poisson_not_hamiltonian_near(const double guess[3], const double last[3])
+{
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < 3; ++i) {
+        distance += fabs(guess[i] - last[i]);
+        size += fabs(last[i]);
+    }
+    return distance <= 4.0 * size;
+}
+
+/* The guess for the next value (y), from earlier ones; 0 if there is none. */
 static int poisson_not_hamiltonian_predict(const poisson_not_hamiltonian_memory *memory, double value[3])
 {
     const int last = memory->count - 1;
@@ -279,7 +291,7 @@ static int poisson_not_hamiltonian_predict(const poisson_not_hamiltonian_memory 
             for (int i = 0; i < 3; ++i) value[i] += binomial * memory->past[last - k][i];
         }
     }
-    return last >= 0;
+    return last >= 0 && poisson_not_hamiltonian_near(value, memory->past[last]);
 }
 
 /* Choose the guess that would have been best for a value that took several iterations. */
@@ -917,7 +929,7 @@ static void poisson_not_hamiltonian_correct(poisson_not_hamiltonian_lines *line,
         for (int lane = 0; lane < poisson_not_hamiltonian_LANES; ++lane) line->y[i][lane] -= delta[i][lane];
 }
 
-/* The largest size; infinite if one is not finite. As integers, the bits of numbers that are not negative have their
+/* The largest of the lanes, which are not negative; infinite if one is not finite. As integers, the bits of numbers that are not negative have their
    order, and those of what is no number are larger. */
 static double poisson_not_hamiltonian_largest(const poisson_not_hamiltonian_lanes size)
 {
@@ -927,6 +939,19 @@ static double poisson_not_hamiltonian_largest(const poisson_not_hamiltonian_lane
     for (int lane = 0; lane < poisson_not_hamiltonian_LANES; ++lane) most = bits[lane] > most ? bits[lane] : most;
     memcpy(&largest, &most, sizeof largest);
     return isfinite(largest) ? largest : HUGE_VAL;
+}
+
+/* poisson_not_hamiltonian_near for the guesses of all lanes, seen from one value. */
+static int poisson_not_hamiltonian_near_lanes(poisson_not_hamiltonian_lanes y[restrict 3], const double last[3])
+{
+    poisson_not_hamiltonian_lanes distance = { 0.0 };
+    double size = 0.0;
+    for (int i = 0; i < 3; ++i) {
+        size += fabs(last[i]);
+        poisson_not_hamiltonian_EACH_LANE
+        for (int lane = 0; lane < poisson_not_hamiltonian_LANES; ++lane) distance[lane] += fabs(y[i][lane] - last[i]);
+    }
+    return poisson_not_hamiltonian_largest(distance) <= 4.0 * size;
 }
 
 /* What is left after a correction of this size: quadratic in it, where the matrices are of the points corrected; where
@@ -1053,8 +1078,10 @@ static int poisson_not_hamiltonian_block(poisson_not_hamiltonian_solver *s, pois
     double x[3], carry[3], value[3], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
     if (!s->foreseeing) poisson_not_hamiltonian_march(s, table, line);
-    for (int stage = 0; stage < 1 && s->foreseeing; ++stage)
-        poisson_not_hamiltonian_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
+    for (int stage = 0; stage < 1; ++stage) {
+        if (s->foreseeing) poisson_not_hamiltonian_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
+        if (!poisson_not_hamiltonian_near_lanes(line[stage].y, s->x)) return 0;
+    }
     while (!solved) {
         double size = 0.0;
         const int matrices = previous > 1e-05;
@@ -1288,6 +1315,21 @@ static int poisson_not_hamiltonian_group_open(poisson_not_hamiltonian_group *gro
     return open;
 }
 
+/* The guess for a stage: recurrences, or extrapolation; the state for members where that is not near. */
+static void poisson_not_hamiltonian_group_predict(poisson_not_hamiltonian_group *group, int stage, poisson_not_hamiltonian_lanes y[3])
+{
+    if (group->fitting[stage]) poisson_not_hamiltonian_group_foresee(group, stage, y);
+    else poisson_not_hamiltonian_group_extrapolate(group, stage, y);
+    for (int lane = 0; lane < poisson_not_hamiltonian_LANES; ++lane) {
+        double distance = 0.0, size = 0.0;
+        for (int i = 0; i < 3; ++i) {
+            distance += fabs(y[i][lane] - group->x[i][lane]);
+            size += fabs(group->x[i][lane]);
+        }
+        for (int i = 0; i < 3 && !(distance <= 4.0 * size); ++i) y[i][lane] = group->x[i][lane];
+    }
+}
+
 /* Newton's method for a stage, until the slowest lane is solved. The number of iterations; where that is the most
    allowed, lanes that are not solved leave the group. */
 static int poisson_not_hamiltonian_group_solve(poisson_not_hamiltonian_group *group, int stage, poisson_not_hamiltonian_lines *line)
@@ -1296,8 +1338,7 @@ static int poisson_not_hamiltonian_group_solve(poisson_not_hamiltonian_group *gr
     double largest = HUGE_VAL, bend = 0.0;
     int iterations = 0, open = 1;
     for (int lane = 0; lane < poisson_not_hamiltonian_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
-    if (group->fitting[stage]) poisson_not_hamiltonian_group_foresee(group, stage, line->y);
-    else poisson_not_hamiltonian_group_extrapolate(group, stage, line->y);
+    poisson_not_hamiltonian_group_predict(group, stage, line->y);
     for (; open > 0 && iterations < 20; ++iterations) {
         memcpy(previous, size, sizeof size);
         poisson_not_hamiltonian_update(group->coef[stage], line, largest > 1e-05);

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: f5ad43f09032385e4563ed717bf1b3123b62d48a12d3b288ef7cd081746bbfb4
+ * body-sha256: 5083a7e229039c5ddc4140384555346e0c7058fd39757e6825ebe57171a99f9f
  */
 #include "predator_prey.h"
 
@@ -158,7 +158,19 @@ static int predator_prey_solve(double matrix[4], double side[2])
     return 1;
 }
 
-/* The guess for the next value (y), from earlier ones; 0 if there are none. */
+/* Whether a guess is where the next values may be. Recurrences that were fitted to little else than rest, near a saddle,
+   may lead anywhere; and far away the equation of a step has solutions that have nothing to do with the motion. */
+static int predator_prey_near(const double guess[2], const double last[2])
+{
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < 2; ++i) {
+        distance += fabs(guess[i] - last[i]);
+        size += fabs(last[i]);
+    }
+    return distance <= 4.0 * size;
+}
+
+/* The guess for the next value (y), from earlier ones; 0 if there is none. */
 static int predator_prey_predict(const predator_prey_memory *memory, double value[2])
 {
     const int last = memory->count - 1;
@@ -177,7 +189,7 @@ static int predator_prey_predict(const predator_prey_memory *memory, double valu
             for (int i = 0; i < 2; ++i) value[i] += binomial * memory->past[last - k][i];
         }
     }
-    return last >= 0;
+    return last >= 0 && predator_prey_near(value, memory->past[last]);
 }
 
 /* Choose the guess that would have been best for a value that took several iterations. */
@@ -609,7 +621,7 @@ static void predator_prey_correct(predator_prey_lines *line, predator_prey_lanes
         for (int lane = 0; lane < predator_prey_LANES; ++lane) line->y[i][lane] -= delta[i][lane];
 }
 
-/* The largest size; infinite if one is not finite. As integers, the bits of numbers that are not negative have their
+/* The largest of the lanes, which are not negative; infinite if one is not finite. As integers, the bits of numbers that are not negative have their
    order, and those of what is no number are larger. */
 static double predator_prey_largest(const predator_prey_lanes size)
 {
@@ -619,6 +631,19 @@ static double predator_prey_largest(const predator_prey_lanes size)
     for (int lane = 0; lane < predator_prey_LANES; ++lane) most = bits[lane] > most ? bits[lane] : most;
     memcpy(&largest, &most, sizeof largest);
     return isfinite(largest) ? largest : HUGE_VAL;
+}
+
+/* predator_prey_near for the guesses of all lanes, seen from one value. */
+static int predator_prey_near_lanes(predator_prey_lanes y[restrict 2], const double last[2])
+{
+    predator_prey_lanes distance = { 0.0 };
+    double size = 0.0;
+    for (int i = 0; i < 2; ++i) {
+        size += fabs(last[i]);
+        predator_prey_EACH_LANE
+        for (int lane = 0; lane < predator_prey_LANES; ++lane) distance[lane] += fabs(y[i][lane] - last[i]);
+    }
+    return predator_prey_largest(distance) <= 4.0 * size;
 }
 
 /* What is left after a correction of this size: quadratic in it, where the matrices are of the points corrected; where
@@ -745,8 +770,10 @@ static int predator_prey_block(predator_prey_solver *s, predator_prey_table *tab
     double x[2], carry[2], value[2], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
     if (!s->foreseeing) predator_prey_march(s, table, line);
-    for (int stage = 0; stage < 1 && s->foreseeing; ++stage)
-        predator_prey_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
+    for (int stage = 0; stage < 1; ++stage) {
+        if (s->foreseeing) predator_prey_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
+        if (!predator_prey_near_lanes(line[stage].y, s->x)) return 0;
+    }
     while (!solved) {
         double size = 0.0;
         const int matrices = previous > 1e-05;
@@ -980,6 +1007,21 @@ static int predator_prey_group_open(predator_prey_group *group, const predator_p
     return open;
 }
 
+/* The guess for a stage: recurrences, or extrapolation; the state for members where that is not near. */
+static void predator_prey_group_predict(predator_prey_group *group, int stage, predator_prey_lanes y[2])
+{
+    if (group->fitting[stage]) predator_prey_group_foresee(group, stage, y);
+    else predator_prey_group_extrapolate(group, stage, y);
+    for (int lane = 0; lane < predator_prey_LANES; ++lane) {
+        double distance = 0.0, size = 0.0;
+        for (int i = 0; i < 2; ++i) {
+            distance += fabs(y[i][lane] - group->x[i][lane]);
+            size += fabs(group->x[i][lane]);
+        }
+        for (int i = 0; i < 2 && !(distance <= 4.0 * size); ++i) y[i][lane] = group->x[i][lane];
+    }
+}
+
 /* Newton's method for a stage, until the slowest lane is solved. The number of iterations; where that is the most
    allowed, lanes that are not solved leave the group. */
 static int predator_prey_group_solve(predator_prey_group *group, int stage, predator_prey_lines *line)
@@ -988,8 +1030,7 @@ static int predator_prey_group_solve(predator_prey_group *group, int stage, pred
     double largest = HUGE_VAL, bend = 0.0;
     int iterations = 0, open = 1;
     for (int lane = 0; lane < predator_prey_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
-    if (group->fitting[stage]) predator_prey_group_foresee(group, stage, line->y);
-    else predator_prey_group_extrapolate(group, stage, line->y);
+    predator_prey_group_predict(group, stage, line->y);
     for (; open > 0 && iterations < 20; ++iterations) {
         memcpy(previous, size, sizeof size);
         predator_prey_update(group->coef[stage], line, largest > 1e-05);

@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: e7f9b3588e51734b03eca41256f909f61b9cfac30eba9d359d20e0a230a85036
+ * body-sha256: 478505556a821b2502fbb911fb80ef059bb5f1f95d1c71b58335c2785614e020
  */
 #include "rigid_body.h"
 
@@ -425,7 +425,19 @@ static int rigid_body_solve(double matrix[9], double side[3])
     return 1;
 }
 
-/* The guess for the next value (y), from earlier ones; 0 if there are none. */
+/* Whether a guess is where the next values may be. Recurrences that were fitted to little else than rest, near a saddle,
+   may lead anywhere; and far away the equation of a step has solutions that have nothing to do with the motion. */
+static int rigid_body_near(const double guess[3], const double last[3])
+{
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < 3; ++i) {
+        distance += fabs(guess[i] - last[i]);
+        size += fabs(last[i]);
+    }
+    return distance <= 4.0 * size;
+}
+
+/* The guess for the next value (y), from earlier ones; 0 if there is none. */
 static int rigid_body_predict(const rigid_body_memory *memory, double value[3])
 {
     const int last = memory->count - 1;
@@ -444,7 +456,7 @@ static int rigid_body_predict(const rigid_body_memory *memory, double value[3])
             for (int i = 0; i < 3; ++i) value[i] += binomial * memory->past[last - k][i];
         }
     }
-    return last >= 0;
+    return last >= 0 && rigid_body_near(value, memory->past[last]);
 }
 
 /* Choose the guess that would have been best for a value that took several iterations. */
@@ -1111,7 +1123,7 @@ static void rigid_body_correct(rigid_body_lines *line, rigid_body_lanes size)
         for (int lane = 0; lane < rigid_body_LANES; ++lane) line->y[i][lane] -= delta[i][lane];
 }
 
-/* The largest size; infinite if one is not finite. As integers, the bits of numbers that are not negative have their
+/* The largest of the lanes, which are not negative; infinite if one is not finite. As integers, the bits of numbers that are not negative have their
    order, and those of what is no number are larger. */
 static double rigid_body_largest(const rigid_body_lanes size)
 {
@@ -1121,6 +1133,19 @@ static double rigid_body_largest(const rigid_body_lanes size)
     for (int lane = 0; lane < rigid_body_LANES; ++lane) most = bits[lane] > most ? bits[lane] : most;
     memcpy(&largest, &most, sizeof largest);
     return isfinite(largest) ? largest : HUGE_VAL;
+}
+
+/* rigid_body_near for the guesses of all lanes, seen from one value. */
+static int rigid_body_near_lanes(rigid_body_lanes y[restrict 3], const double last[3])
+{
+    rigid_body_lanes distance = { 0.0 };
+    double size = 0.0;
+    for (int i = 0; i < 3; ++i) {
+        size += fabs(last[i]);
+        rigid_body_EACH_LANE
+        for (int lane = 0; lane < rigid_body_LANES; ++lane) distance[lane] += fabs(y[i][lane] - last[i]);
+    }
+    return rigid_body_largest(distance) <= 4.0 * size;
 }
 
 /* What is left after a correction of this size: quadratic in it, where the matrices are of the points corrected; where
@@ -1247,8 +1272,10 @@ static int rigid_body_block(rigid_body_solver *s, rigid_body_table *table, int m
     double x[3], carry[3], value[3], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
     if (!s->foreseeing) rigid_body_march(s, table, line);
-    for (int stage = 0; stage < 1 && s->foreseeing; ++stage)
-        rigid_body_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
+    for (int stage = 0; stage < 1; ++stage) {
+        if (s->foreseeing) rigid_body_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
+        if (!rigid_body_near_lanes(line[stage].y, s->x)) return 0;
+    }
     while (!solved) {
         double size = 0.0;
         const int matrices = previous > 1e-05;
@@ -1483,6 +1510,21 @@ static int rigid_body_group_open(rigid_body_group *group, const rigid_body_lanes
     return open;
 }
 
+/* The guess for a stage: recurrences, or extrapolation; the state for members where that is not near. */
+static void rigid_body_group_predict(rigid_body_group *group, int stage, rigid_body_lanes y[3])
+{
+    if (group->fitting[stage]) rigid_body_group_foresee(group, stage, y);
+    else rigid_body_group_extrapolate(group, stage, y);
+    for (int lane = 0; lane < rigid_body_LANES; ++lane) {
+        double distance = 0.0, size = 0.0;
+        for (int i = 0; i < 3; ++i) {
+            distance += fabs(y[i][lane] - group->x[i][lane]);
+            size += fabs(group->x[i][lane]);
+        }
+        for (int i = 0; i < 3 && !(distance <= 4.0 * size); ++i) y[i][lane] = group->x[i][lane];
+    }
+}
+
 /* Newton's method for a stage, until the slowest lane is solved. The number of iterations; where that is the most
    allowed, lanes that are not solved leave the group. */
 static int rigid_body_group_solve(rigid_body_group *group, int stage, rigid_body_lines *line)
@@ -1491,8 +1533,7 @@ static int rigid_body_group_solve(rigid_body_group *group, int stage, rigid_body
     double largest = HUGE_VAL, bend = 0.0;
     int iterations = 0, open = 1;
     for (int lane = 0; lane < rigid_body_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
-    if (group->fitting[stage]) rigid_body_group_foresee(group, stage, line->y);
-    else rigid_body_group_extrapolate(group, stage, line->y);
+    rigid_body_group_predict(group, stage, line->y);
     for (; open > 0 && iterations < 20; ++iterations) {
         memcpy(previous, size, sizeof size);
         rigid_body_update(group->coef[stage], line, largest > 1e-05);

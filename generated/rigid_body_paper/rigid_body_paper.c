@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: f5a9ad631716432e7f8f999acd65bfe816387385431f6afcda4c2c757173cabe
+ * body-sha256: 1a4d874ff503df88d5f8aad7ffe1d3bf284329d2ef973afe2f84382afab80ec7
  */
 #include "rigid_body_paper.h"
 
@@ -267,7 +267,19 @@ static int rigid_body_paper_solve(double matrix[9], double side[3])
     return 1;
 }
 
-/* The guess for the next value (y), from earlier ones; 0 if there are none. */
+/* Whether a guess is where the next values may be. Recurrences that were fitted to little else than rest, near a saddle,
+   may lead anywhere; and far away the equation of a step has solutions that have nothing to do with the motion. */
+static int rigid_body_paper_near(const double guess[3], const double last[3])
+{
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < 3; ++i) {
+        distance += fabs(guess[i] - last[i]);
+        size += fabs(last[i]);
+    }
+    return distance <= 4.0 * size;
+}
+
+/* The guess for the next value (y), from earlier ones; 0 if there is none. */
 static int rigid_body_paper_predict(const rigid_body_paper_memory *memory, double value[3])
 {
     const int last = memory->count - 1;
@@ -286,7 +298,7 @@ static int rigid_body_paper_predict(const rigid_body_paper_memory *memory, doubl
             for (int i = 0; i < 3; ++i) value[i] += binomial * memory->past[last - k][i];
         }
     }
-    return last >= 0;
+    return last >= 0 && rigid_body_paper_near(value, memory->past[last]);
 }
 
 /* Choose the guess that would have been best for a value that took several iterations. */
@@ -788,7 +800,7 @@ static void rigid_body_paper_correct(rigid_body_paper_lines *line, rigid_body_pa
         for (int lane = 0; lane < rigid_body_paper_LANES; ++lane) line->y[i][lane] -= delta[i][lane];
 }
 
-/* The largest size; infinite if one is not finite. As integers, the bits of numbers that are not negative have their
+/* The largest of the lanes, which are not negative; infinite if one is not finite. As integers, the bits of numbers that are not negative have their
    order, and those of what is no number are larger. */
 static double rigid_body_paper_largest(const rigid_body_paper_lanes size)
 {
@@ -798,6 +810,19 @@ static double rigid_body_paper_largest(const rigid_body_paper_lanes size)
     for (int lane = 0; lane < rigid_body_paper_LANES; ++lane) most = bits[lane] > most ? bits[lane] : most;
     memcpy(&largest, &most, sizeof largest);
     return isfinite(largest) ? largest : HUGE_VAL;
+}
+
+/* rigid_body_paper_near for the guesses of all lanes, seen from one value. */
+static int rigid_body_paper_near_lanes(rigid_body_paper_lanes y[restrict 3], const double last[3])
+{
+    rigid_body_paper_lanes distance = { 0.0 };
+    double size = 0.0;
+    for (int i = 0; i < 3; ++i) {
+        size += fabs(last[i]);
+        rigid_body_paper_EACH_LANE
+        for (int lane = 0; lane < rigid_body_paper_LANES; ++lane) distance[lane] += fabs(y[i][lane] - last[i]);
+    }
+    return rigid_body_paper_largest(distance) <= 4.0 * size;
 }
 
 /* What is left after a correction of this size: quadratic in it, where the matrices are of the points corrected; where
@@ -924,8 +949,10 @@ static int rigid_body_paper_block(rigid_body_paper_solver *s, rigid_body_paper_t
     double x[3], carry[3], value[3], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
     if (!s->foreseeing) rigid_body_paper_march(s, table, line);
-    for (int stage = 0; stage < 1 && s->foreseeing; ++stage)
-        rigid_body_paper_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
+    for (int stage = 0; stage < 1; ++stage) {
+        if (s->foreseeing) rigid_body_paper_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
+        if (!rigid_body_paper_near_lanes(line[stage].y, s->x)) return 0;
+    }
     while (!solved) {
         double size = 0.0;
         const int matrices = previous > 1e-05;
@@ -1159,6 +1186,21 @@ static int rigid_body_paper_group_open(rigid_body_paper_group *group, const rigi
     return open;
 }
 
+/* The guess for a stage: recurrences, or extrapolation; the state for members where that is not near. */
+static void rigid_body_paper_group_predict(rigid_body_paper_group *group, int stage, rigid_body_paper_lanes y[3])
+{
+    if (group->fitting[stage]) rigid_body_paper_group_foresee(group, stage, y);
+    else rigid_body_paper_group_extrapolate(group, stage, y);
+    for (int lane = 0; lane < rigid_body_paper_LANES; ++lane) {
+        double distance = 0.0, size = 0.0;
+        for (int i = 0; i < 3; ++i) {
+            distance += fabs(y[i][lane] - group->x[i][lane]);
+            size += fabs(group->x[i][lane]);
+        }
+        for (int i = 0; i < 3 && !(distance <= 4.0 * size); ++i) y[i][lane] = group->x[i][lane];
+    }
+}
+
 /* Newton's method for a stage, until the slowest lane is solved. The number of iterations; where that is the most
    allowed, lanes that are not solved leave the group. */
 static int rigid_body_paper_group_solve(rigid_body_paper_group *group, int stage, rigid_body_paper_lines *line)
@@ -1167,8 +1209,7 @@ static int rigid_body_paper_group_solve(rigid_body_paper_group *group, int stage
     double largest = HUGE_VAL, bend = 0.0;
     int iterations = 0, open = 1;
     for (int lane = 0; lane < rigid_body_paper_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
-    if (group->fitting[stage]) rigid_body_paper_group_foresee(group, stage, line->y);
-    else rigid_body_paper_group_extrapolate(group, stage, line->y);
+    rigid_body_paper_group_predict(group, stage, line->y);
     for (; open > 0 && iterations < 20; ++iterations) {
         memcpy(previous, size, sizeof size);
         rigid_body_paper_update(group->coef[stage], line, largest > 1e-05);

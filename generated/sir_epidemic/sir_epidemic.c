@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: e33b7d92e14d5e86e57319acb6bf87eba77488cbcde48e028fe945f1275048ab
+ * body-sha256: c0d93d55805939cc89b417cc22d86615cfe29e7299da63a1cc003ea2e776b7a1
  */
 #include "sir_epidemic.h"
 
@@ -127,7 +127,19 @@ static int sir_epidemic_solve(double matrix[9], double side[3])
     return 1;
 }
 
-/* The guess for the next value (p), from earlier ones; 0 if there are none. */
+/* Whether a guess is where the next values may be. Recurrences that were fitted to little else than rest, near a saddle,
+   may lead anywhere; and far away the equation of a step has solutions that have nothing to do with the motion. */
+static int sir_epidemic_near(const double guess[3], const double last[3])
+{
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < 3; ++i) {
+        distance += fabs(guess[i] - last[i]);
+        size += fabs(last[i]);
+    }
+    return distance <= 4.0 * size;
+}
+
+/* The guess for the next value (p), from earlier ones; 0 if there is none. */
 static int sir_epidemic_predict(const sir_epidemic_memory *memory, double value[3])
 {
     const int last = memory->count - 1;
@@ -146,7 +158,7 @@ static int sir_epidemic_predict(const sir_epidemic_memory *memory, double value[
             for (int i = 0; i < 3; ++i) value[i] += binomial * memory->past[last - k][i];
         }
     }
-    return last >= 0;
+    return last >= 0 && sir_epidemic_near(value, memory->past[last]);
 }
 
 /* Choose the guess that would have been best for a value that took several iterations. */

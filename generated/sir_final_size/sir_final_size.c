@@ -12,7 +12,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: c02a7e6191d22e599a9d815c1d02dfdf8f3b5566ef7accf2ca6da4d3ba1cc3d0
+ * body-sha256: 812fda3ce981d08692097441db15606ef2c2db396bb5143bd9113fa34c91a2f5
  */
 #include "sir_final_size.h"
 
@@ -119,7 +119,19 @@ static int sir_final_size_solve(double matrix[9], double side[3])
     return 1;
 }
 
-/* The guess for the next value (p), from earlier ones; 0 if there are none. */
+/* Whether a guess is where the next values may be. Recurrences that were fitted to little else than rest, near a saddle,
+   may lead anywhere; and far away the equation of a step has solutions that have nothing to do with the motion. */
+static int sir_final_size_near(const double guess[3], const double last[3])
+{
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < 3; ++i) {
+        distance += fabs(guess[i] - last[i]);
+        size += fabs(last[i]);
+    }
+    return distance <= 4.0 * size;
+}
+
+/* The guess for the next value (p), from earlier ones; 0 if there is none. */
 static int sir_final_size_predict(const sir_final_size_memory *memory, double value[3])
 {
     const int last = memory->count - 1;
@@ -138,7 +150,7 @@ static int sir_final_size_predict(const sir_final_size_memory *memory, double va
             for (int i = 0; i < 3; ++i) value[i] += binomial * memory->past[last - k][i];
         }
     }
-    return last >= 0;
+    return last >= 0 && sir_final_size_near(value, memory->past[last]);
 }
 
 /* Choose the guess that would have been best for a value that took several iterations. */

@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 1d56e8e87ae0b60b5ac53c8b4e813b1f21b05d6d2930ab3f6be08df5eae6556d
+ * body-sha256: e6dee6b1eecf14158cd242690c7e7c4a07e00c95e2aa10e9ac570dc7c5412092
  */
 #include "sklyanin_gyrostat.h"
 
@@ -223,7 +223,19 @@ static int sklyanin_gyrostat_solve(double matrix[16], double side[4])
     return 1;
 }
 
-/* The guess for the next value (p), from earlier ones; 0 if there are none. */
+/* Whether a guess is where the next values may be. Recurrences that were fitted to little else than rest, near a saddle,
+   may lead anywhere; and far away the equation of a step has solutions that have nothing to do with the motion. */
+static int sklyanin_gyrostat_near(const double guess[4], const double last[4])
+{
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < 4; ++i) {
+        distance += fabs(guess[i] - last[i]);
+        size += fabs(last[i]);
+    }
+    return distance <= 4.0 * size;
+}
+
+/* The guess for the next value (p), from earlier ones; 0 if there is none. */
 static int sklyanin_gyrostat_predict(const sklyanin_gyrostat_memory *memory, double value[4])
 {
     const int last = memory->count - 1;
@@ -242,7 +254,7 @@ static int sklyanin_gyrostat_predict(const sklyanin_gyrostat_memory *memory, dou
             for (int i = 0; i < 4; ++i) value[i] += binomial * memory->past[last - k][i];
         }
     }
-    return last >= 0;
+    return last >= 0 && sklyanin_gyrostat_near(value, memory->past[last]);
 }
 
 /* Choose the guess that would have been best for a value that took several iterations. */

@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 9a5dd740e2d3074135ef68fb8de568ee497e7d4a6906d4a3ba1d8fd6ff952277
+ * body-sha256: e32b299b156d4a8ff241831791180df79eb3c23b3082809865fe385a33088f40
  */
 #include "so4_manakov.h"
 
@@ -732,7 +732,19 @@ static int so4_manakov_solve(double matrix[36], double side[6])
     return 1;
 }
 
-/* The guess for the next value (y), from earlier ones; 0 if there are none. */
+/* Whether a guess is where the next values may be. Recurrences that were fitted to little else than rest, near a saddle,
+   may lead anywhere; and far away the equation of a step has solutions that have nothing to do with the motion. */
+static int so4_manakov_near(const double guess[6], const double last[6])
+{
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < 6; ++i) {
+        distance += fabs(guess[i] - last[i]);
+        size += fabs(last[i]);
+    }
+    return distance <= 4.0 * size;
+}
+
+/* The guess for the next value (y), from earlier ones; 0 if there is none. */
 static int so4_manakov_predict(const so4_manakov_memory *memory, double value[6])
 {
     const int last = memory->count - 1;
@@ -751,7 +763,7 @@ static int so4_manakov_predict(const so4_manakov_memory *memory, double value[6]
             for (int i = 0; i < 6; ++i) value[i] += binomial * memory->past[last - k][i];
         }
     }
-    return last >= 0;
+    return last >= 0 && so4_manakov_near(value, memory->past[last]);
 }
 
 /* Choose the guess that would have been best for a value that took several iterations. */
@@ -1916,7 +1928,7 @@ static void so4_manakov_correct(so4_manakov_lines *line, so4_manakov_lanes size)
         for (int lane = 0; lane < so4_manakov_LANES; ++lane) line->y[i][lane] -= delta[i][lane];
 }
 
-/* The largest size; infinite if one is not finite. As integers, the bits of numbers that are not negative have their
+/* The largest of the lanes, which are not negative; infinite if one is not finite. As integers, the bits of numbers that are not negative have their
    order, and those of what is no number are larger. */
 static double so4_manakov_largest(const so4_manakov_lanes size)
 {
@@ -1926,6 +1938,19 @@ static double so4_manakov_largest(const so4_manakov_lanes size)
     for (int lane = 0; lane < so4_manakov_LANES; ++lane) most = bits[lane] > most ? bits[lane] : most;
     memcpy(&largest, &most, sizeof largest);
     return isfinite(largest) ? largest : HUGE_VAL;
+}
+
+/* so4_manakov_near for the guesses of all lanes, seen from one value. */
+static int so4_manakov_near_lanes(so4_manakov_lanes y[restrict 6], const double last[6])
+{
+    so4_manakov_lanes distance = { 0.0 };
+    double size = 0.0;
+    for (int i = 0; i < 6; ++i) {
+        size += fabs(last[i]);
+        so4_manakov_EACH_LANE
+        for (int lane = 0; lane < so4_manakov_LANES; ++lane) distance[lane] += fabs(y[i][lane] - last[i]);
+    }
+    return so4_manakov_largest(distance) <= 4.0 * size;
 }
 
 /* What is left after a correction of this size: quadratic in it, where the matrices are of the points corrected; where
@@ -2052,8 +2077,10 @@ static int so4_manakov_block(so4_manakov_solver *s, so4_manakov_table *table, in
     double x[6], carry[6], value[6], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
     if (!s->foreseeing) so4_manakov_march(s, table, line);
-    for (int stage = 0; stage < 1 && s->foreseeing; ++stage)
-        so4_manakov_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
+    for (int stage = 0; stage < 1; ++stage) {
+        if (s->foreseeing) so4_manakov_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
+        if (!so4_manakov_near_lanes(line[stage].y, s->x)) return 0;
+    }
     while (!solved) {
         double size = 0.0;
         const int matrices = previous > 1e-05;
@@ -2288,6 +2315,21 @@ static int so4_manakov_group_open(so4_manakov_group *group, const so4_manakov_la
     return open;
 }
 
+/* The guess for a stage: recurrences, or extrapolation; the state for members where that is not near. */
+static void so4_manakov_group_predict(so4_manakov_group *group, int stage, so4_manakov_lanes y[6])
+{
+    if (group->fitting[stage]) so4_manakov_group_foresee(group, stage, y);
+    else so4_manakov_group_extrapolate(group, stage, y);
+    for (int lane = 0; lane < so4_manakov_LANES; ++lane) {
+        double distance = 0.0, size = 0.0;
+        for (int i = 0; i < 6; ++i) {
+            distance += fabs(y[i][lane] - group->x[i][lane]);
+            size += fabs(group->x[i][lane]);
+        }
+        for (int i = 0; i < 6 && !(distance <= 4.0 * size); ++i) y[i][lane] = group->x[i][lane];
+    }
+}
+
 /* Newton's method for a stage, until the slowest lane is solved. The number of iterations; where that is the most
    allowed, lanes that are not solved leave the group. */
 static int so4_manakov_group_solve(so4_manakov_group *group, int stage, so4_manakov_lines *line)
@@ -2296,8 +2338,7 @@ static int so4_manakov_group_solve(so4_manakov_group *group, int stage, so4_mana
     double largest = HUGE_VAL, bend = 0.0;
     int iterations = 0, open = 1;
     for (int lane = 0; lane < so4_manakov_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
-    if (group->fitting[stage]) so4_manakov_group_foresee(group, stage, line->y);
-    else so4_manakov_group_extrapolate(group, stage, line->y);
+    so4_manakov_group_predict(group, stage, line->y);
     for (; open > 0 && iterations < 20; ++iterations) {
         memcpy(previous, size, sizeof size);
         so4_manakov_update(group->coef[stage], line, largest > 1e-05);

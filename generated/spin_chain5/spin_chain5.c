@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 6a5af8e86a3e4dcc3eb985884157ae69e13c703072562db2b7cbc1da3e453930
+ * body-sha256: dddb4abd38908d4ed9f242125d72de65b4bd1279bdf2ef7fa19f34517912af15
  */
 #include "spin_chain5.h"
 
@@ -1710,7 +1710,19 @@ static int spin_chain5_solve(double matrix[225], double side[15])
     return 1;
 }
 
-/* The guess for the next value (y), from earlier ones; 0 if there are none. */
+/* Whether a guess is where the next values may be. Recurrences that were fitted to little else than rest, near a saddle,
+   may lead anywhere; and far away the equation of a step has solutions that have nothing to do with the motion. */
+static int spin_chain5_near(const double guess[15], const double last[15])
+{
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < 15; ++i) {
+        distance += fabs(guess[i] - last[i]);
+        size += fabs(last[i]);
+    }
+    return distance <= 4.0 * size;
+}
+
+/* The guess for the next value (y), from earlier ones; 0 if there is none. */
 static int spin_chain5_predict(const spin_chain5_memory *memory, double value[15])
 {
     const int last = memory->count - 1;
@@ -1729,7 +1741,7 @@ static int spin_chain5_predict(const spin_chain5_memory *memory, double value[15
             for (int i = 0; i < 15; ++i) value[i] += binomial * memory->past[last - k][i];
         }
     }
-    return last >= 0;
+    return last >= 0 && spin_chain5_near(value, memory->past[last]);
 }
 
 /* Choose the guess that would have been best for a value that took several iterations. */
@@ -4536,7 +4548,7 @@ static void spin_chain5_correct(spin_chain5_lines *line, spin_chain5_lanes size)
         for (int lane = 0; lane < spin_chain5_LANES; ++lane) line->y[i][lane] -= delta[i][lane];
 }
 
-/* The largest size; infinite if one is not finite. As integers, the bits of numbers that are not negative have their
+/* The largest of the lanes, which are not negative; infinite if one is not finite. As integers, the bits of numbers that are not negative have their
    order, and those of what is no number are larger. */
 static double spin_chain5_largest(const spin_chain5_lanes size)
 {
@@ -4546,6 +4558,19 @@ static double spin_chain5_largest(const spin_chain5_lanes size)
     for (int lane = 0; lane < spin_chain5_LANES; ++lane) most = bits[lane] > most ? bits[lane] : most;
     memcpy(&largest, &most, sizeof largest);
     return isfinite(largest) ? largest : HUGE_VAL;
+}
+
+/* spin_chain5_near for the guesses of all lanes, seen from one value. */
+static int spin_chain5_near_lanes(spin_chain5_lanes y[restrict 15], const double last[15])
+{
+    spin_chain5_lanes distance = { 0.0 };
+    double size = 0.0;
+    for (int i = 0; i < 15; ++i) {
+        size += fabs(last[i]);
+        spin_chain5_EACH_LANE
+        for (int lane = 0; lane < spin_chain5_LANES; ++lane) distance[lane] += fabs(y[i][lane] - last[i]);
+    }
+    return spin_chain5_largest(distance) <= 4.0 * size;
 }
 
 /* What is left after a correction of this size: quadratic in it, where the matrices are of the points corrected; where
@@ -4672,8 +4697,10 @@ static int spin_chain5_block(spin_chain5_solver *s, spin_chain5_table *table, in
     double x[15], carry[15], value[15], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
     if (!s->foreseeing) spin_chain5_march(s, table, line);
-    for (int stage = 0; stage < 1 && s->foreseeing; ++stage)
-        spin_chain5_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
+    for (int stage = 0; stage < 1; ++stage) {
+        if (s->foreseeing) spin_chain5_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
+        if (!spin_chain5_near_lanes(line[stage].y, s->x)) return 0;
+    }
     while (!solved) {
         double size = 0.0;
         const int matrices = previous > 1e-05;
@@ -4908,6 +4935,21 @@ static int spin_chain5_group_open(spin_chain5_group *group, const spin_chain5_la
     return open;
 }
 
+/* The guess for a stage: recurrences, or extrapolation; the state for members where that is not near. */
+static void spin_chain5_group_predict(spin_chain5_group *group, int stage, spin_chain5_lanes y[15])
+{
+    if (group->fitting[stage]) spin_chain5_group_foresee(group, stage, y);
+    else spin_chain5_group_extrapolate(group, stage, y);
+    for (int lane = 0; lane < spin_chain5_LANES; ++lane) {
+        double distance = 0.0, size = 0.0;
+        for (int i = 0; i < 15; ++i) {
+            distance += fabs(y[i][lane] - group->x[i][lane]);
+            size += fabs(group->x[i][lane]);
+        }
+        for (int i = 0; i < 15 && !(distance <= 4.0 * size); ++i) y[i][lane] = group->x[i][lane];
+    }
+}
+
 /* Newton's method for a stage, until the slowest lane is solved. The number of iterations; where that is the most
    allowed, lanes that are not solved leave the group. */
 static int spin_chain5_group_solve(spin_chain5_group *group, int stage, spin_chain5_lines *line)
@@ -4916,8 +4958,7 @@ static int spin_chain5_group_solve(spin_chain5_group *group, int stage, spin_cha
     double largest = HUGE_VAL, bend = 0.0;
     int iterations = 0, open = 1;
     for (int lane = 0; lane < spin_chain5_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
-    if (group->fitting[stage]) spin_chain5_group_foresee(group, stage, line->y);
-    else spin_chain5_group_extrapolate(group, stage, line->y);
+    spin_chain5_group_predict(group, stage, line->y);
     for (; open > 0 && iterations < 20; ++iterations) {
         memcpy(previous, size, sizeof size);
         spin_chain5_update(group->coef[stage], line, largest > 1e-05);

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: d719f9fb70febca773ca7e123bf21c39a0b7ac30db8dc354426e477e792ed8fe
+ * body-sha256: f037a2ecea1d5b5448543ac9994471c287e5cefa70ccf4d28a9e5b6329c3d5ff
  */
 #include "toda3.h"
 
@@ -342,7 +342,19 @@ static int toda3_solve(double matrix[25], double side[5])
     return 1;
 }
 
-/* The guess for the next value (y), from earlier ones; 0 if there are none. */
+/* Whether a guess is where the next values may be. Recurrences that were fitted to little else than rest, near a saddle,
+   may lead anywhere; and far away the equation of a step has solutions that have nothing to do with the motion. */
+static int toda3_near(const double guess[5], const double last[5])
+{
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < 5; ++i) {
+        distance += fabs(guess[i] - last[i]);
+        size += fabs(last[i]);
+    }
+    return distance <= 4.0 * size;
+}
+
+/* The guess for the next value (y), from earlier ones; 0 if there is none. */
 static int toda3_predict(const toda3_memory *memory, double value[5])
 {
     const int last = memory->count - 1;
@@ -361,7 +373,7 @@ static int toda3_predict(const toda3_memory *memory, double value[5])
             for (int i = 0; i < 5; ++i) value[i] += binomial * memory->past[last - k][i];
         }
     }
-    return last >= 0;
+    return last >= 0 && toda3_near(value, memory->past[last]);
 }
 
 /* Choose the guess that would have been best for a value that took several iterations. */
@@ -967,7 +979,7 @@ static void toda3_correct(toda3_lines *line, toda3_lanes size)
         for (int lane = 0; lane < toda3_LANES; ++lane) line->y[i][lane] -= delta[i][lane];
 }
 
-/* The largest size; infinite if one is not finite. As integers, the bits of numbers that are not negative have their
+/* The largest of the lanes, which are not negative; infinite if one is not finite. As integers, the bits of numbers that are not negative have their
    order, and those of what is no number are larger. */
 static double toda3_largest(const toda3_lanes size)
 {
@@ -977,6 +989,19 @@ static double toda3_largest(const toda3_lanes size)
     for (int lane = 0; lane < toda3_LANES; ++lane) most = bits[lane] > most ? bits[lane] : most;
     memcpy(&largest, &most, sizeof largest);
     return isfinite(largest) ? largest : HUGE_VAL;
+}
+
+/* toda3_near for the guesses of all lanes, seen from one value. */
+static int toda3_near_lanes(toda3_lanes y[restrict 5], const double last[5])
+{
+    toda3_lanes distance = { 0.0 };
+    double size = 0.0;
+    for (int i = 0; i < 5; ++i) {
+        size += fabs(last[i]);
+        toda3_EACH_LANE
+        for (int lane = 0; lane < toda3_LANES; ++lane) distance[lane] += fabs(y[i][lane] - last[i]);
+    }
+    return toda3_largest(distance) <= 4.0 * size;
 }
 
 /* What is left after a correction of this size: quadratic in it, where the matrices are of the points corrected; where
@@ -1103,8 +1128,10 @@ static int toda3_block(toda3_solver *s, toda3_table *table, int most)
     double x[5], carry[5], value[5], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
     if (!s->foreseeing) toda3_march(s, table, line);
-    for (int stage = 0; stage < 1 && s->foreseeing; ++stage)
-        toda3_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
+    for (int stage = 0; stage < 1; ++stage) {
+        if (s->foreseeing) toda3_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
+        if (!toda3_near_lanes(line[stage].y, s->x)) return 0;
+    }
     while (!solved) {
         double size = 0.0;
         const int matrices = previous > 1e-05;
@@ -1338,6 +1365,21 @@ static int toda3_group_open(toda3_group *group, const toda3_lanes size, const to
     return open;
 }
 
+/* The guess for a stage: recurrences, or extrapolation; the state for members where that is not near. */
+static void toda3_group_predict(toda3_group *group, int stage, toda3_lanes y[5])
+{
+    if (group->fitting[stage]) toda3_group_foresee(group, stage, y);
+    else toda3_group_extrapolate(group, stage, y);
+    for (int lane = 0; lane < toda3_LANES; ++lane) {
+        double distance = 0.0, size = 0.0;
+        for (int i = 0; i < 5; ++i) {
+            distance += fabs(y[i][lane] - group->x[i][lane]);
+            size += fabs(group->x[i][lane]);
+        }
+        for (int i = 0; i < 5 && !(distance <= 4.0 * size); ++i) y[i][lane] = group->x[i][lane];
+    }
+}
+
 /* Newton's method for a stage, until the slowest lane is solved. The number of iterations; where that is the most
    allowed, lanes that are not solved leave the group. */
 static int toda3_group_solve(toda3_group *group, int stage, toda3_lines *line)
@@ -1346,8 +1388,7 @@ static int toda3_group_solve(toda3_group *group, int stage, toda3_lines *line)
     double largest = HUGE_VAL, bend = 0.0;
     int iterations = 0, open = 1;
     for (int lane = 0; lane < toda3_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
-    if (group->fitting[stage]) toda3_group_foresee(group, stage, line->y);
-    else toda3_group_extrapolate(group, stage, line->y);
+    toda3_group_predict(group, stage, line->y);
     for (; open > 0 && iterations < 20; ++iterations) {
         memcpy(previous, size, sizeof size);
         toda3_update(group->coef[stage], line, largest > 1e-05);

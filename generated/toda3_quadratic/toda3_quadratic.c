@@ -12,7 +12,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: b5ccab0b768bab421ee30f8f6bdaa4477b593f8c6b4340fb55b9536cc7a2523d
+ * body-sha256: b518b77a0efd945696c282479f07d1d36a8dde886e9929180379efb79401394a
  */
 #include "toda3_quadratic.h"
 
@@ -101,7 +101,19 @@ static int toda3_quadratic_solve(double matrix[25], double side[5])
     return 1;
 }
 
-/* The guess for the next value (p), from earlier ones; 0 if there are none. */
+/* Whether a guess is where the next values may be. Recurrences that were fitted to little else than rest, near a saddle,
+   may lead anywhere; and far away the equation of a step has solutions that have nothing to do with the motion. */
+static int toda3_quadratic_near(const double guess[5], const double last[5])
+{
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < 5; ++i) {
+        distance += fabs(guess[i] - last[i]);
+        size += fabs(last[i]);
+    }
+    return distance <= 4.0 * size;
+}
+
+/* The guess for the next value (p), from earlier ones; 0 if there is none. */
 static int toda3_quadratic_predict(const toda3_quadratic_memory *memory, double value[5])
 {
     const int last = memory->count - 1;
@@ -120,7 +132,7 @@ static int toda3_quadratic_predict(const toda3_quadratic_memory *memory, double 
             for (int i = 0; i < 5; ++i) value[i] += binomial * memory->past[last - k][i];
         }
     }
-    return last >= 0;
+    return last >= 0 && toda3_quadratic_near(value, memory->past[last]);
 }
 
 /* Choose the guess that would have been best for a value that took several iterations. */

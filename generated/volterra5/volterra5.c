@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 38fcf9a52542d60fc754ac5c56623af7df09434640864166a67e38493832c443
+ * body-sha256: 1038a4b4c7230bc1f3c42e42938a0f1b0655f4991bdadf36a5657d96f979b21f
  */
 #include "volterra5.h"
 
@@ -253,7 +253,19 @@ static int volterra5_solve(double matrix[25], double side[5])
     return 1;
 }
 
-/* The guess for the next value (y), from earlier ones; 0 if there are none. */
+/* Whether a guess is where the next values may be. Recurrences that were fitted to little else than rest, near a saddle,
+   may lead anywhere; and far away the equation of a step has solutions that have nothing to do with the motion. */
+static int volterra5_near(const double guess[5], const double last[5])
+{
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < 5; ++i) {
+        distance += fabs(guess[i] - last[i]);
+        size += fabs(last[i]);
+    }
+    return distance <= 4.0 * size;
+}
+
+/* The guess for the next value (y), from earlier ones; 0 if there is none. */
 static int volterra5_predict(const volterra5_memory *memory, double value[5])
 {
     const int last = memory->count - 1;
@@ -272,7 +284,7 @@ static int volterra5_predict(const volterra5_memory *memory, double value[5])
             for (int i = 0; i < 5; ++i) value[i] += binomial * memory->past[last - k][i];
         }
     }
-    return last >= 0;
+    return last >= 0 && volterra5_near(value, memory->past[last]);
 }
 
 /* Choose the guess that would have been best for a value that took several iterations. */
@@ -875,7 +887,7 @@ static void volterra5_correct(volterra5_lines *line, volterra5_lanes size)
         for (int lane = 0; lane < volterra5_LANES; ++lane) line->y[i][lane] -= delta[i][lane];
 }
 
-/* The largest size; infinite if one is not finite. As integers, the bits of numbers that are not negative have their
+/* The largest of the lanes, which are not negative; infinite if one is not finite. As integers, the bits of numbers that are not negative have their
    order, and those of what is no number are larger. */
 static double volterra5_largest(const volterra5_lanes size)
 {
@@ -885,6 +897,19 @@ static double volterra5_largest(const volterra5_lanes size)
     for (int lane = 0; lane < volterra5_LANES; ++lane) most = bits[lane] > most ? bits[lane] : most;
     memcpy(&largest, &most, sizeof largest);
     return isfinite(largest) ? largest : HUGE_VAL;
+}
+
+/* volterra5_near for the guesses of all lanes, seen from one value. */
+static int volterra5_near_lanes(volterra5_lanes y[restrict 5], const double last[5])
+{
+    volterra5_lanes distance = { 0.0 };
+    double size = 0.0;
+    for (int i = 0; i < 5; ++i) {
+        size += fabs(last[i]);
+        volterra5_EACH_LANE
+        for (int lane = 0; lane < volterra5_LANES; ++lane) distance[lane] += fabs(y[i][lane] - last[i]);
+    }
+    return volterra5_largest(distance) <= 4.0 * size;
 }
 
 /* What is left after a correction of this size: quadratic in it, where the matrices are of the points corrected; where
@@ -1011,8 +1036,10 @@ static int volterra5_block(volterra5_solver *s, volterra5_table *table, int most
     double x[5], carry[5], value[5], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
     if (!s->foreseeing) volterra5_march(s, table, line);
-    for (int stage = 0; stage < 1 && s->foreseeing; ++stage)
-        volterra5_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
+    for (int stage = 0; stage < 1; ++stage) {
+        if (s->foreseeing) volterra5_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
+        if (!volterra5_near_lanes(line[stage].y, s->x)) return 0;
+    }
     while (!solved) {
         double size = 0.0;
         const int matrices = previous > 1e-05;
@@ -1246,6 +1273,21 @@ static int volterra5_group_open(volterra5_group *group, const volterra5_lanes si
     return open;
 }
 
+/* The guess for a stage: recurrences, or extrapolation; the state for members where that is not near. */
+static void volterra5_group_predict(volterra5_group *group, int stage, volterra5_lanes y[5])
+{
+    if (group->fitting[stage]) volterra5_group_foresee(group, stage, y);
+    else volterra5_group_extrapolate(group, stage, y);
+    for (int lane = 0; lane < volterra5_LANES; ++lane) {
+        double distance = 0.0, size = 0.0;
+        for (int i = 0; i < 5; ++i) {
+            distance += fabs(y[i][lane] - group->x[i][lane]);
+            size += fabs(group->x[i][lane]);
+        }
+        for (int i = 0; i < 5 && !(distance <= 4.0 * size); ++i) y[i][lane] = group->x[i][lane];
+    }
+}
+
 /* Newton's method for a stage, until the slowest lane is solved. The number of iterations; where that is the most
    allowed, lanes that are not solved leave the group. */
 static int volterra5_group_solve(volterra5_group *group, int stage, volterra5_lines *line)
@@ -1254,8 +1296,7 @@ static int volterra5_group_solve(volterra5_group *group, int stage, volterra5_li
     double largest = HUGE_VAL, bend = 0.0;
     int iterations = 0, open = 1;
     for (int lane = 0; lane < volterra5_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
-    if (group->fitting[stage]) volterra5_group_foresee(group, stage, line->y);
-    else volterra5_group_extrapolate(group, stage, line->y);
+    volterra5_group_predict(group, stage, line->y);
     for (; open > 0 && iterations < 20; ++iterations) {
         memcpy(previous, size, sizeof size);
         volterra5_update(group->coef[stage], line, largest > 1e-05);

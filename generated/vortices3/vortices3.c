@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 57504a05fb4a3a01fb86728578766f31471e87a45054f06adc90d9c536b40bcf
+ * body-sha256: 179a8afe94e43f25620713efbf1441213d775312680a38a480185daa2b4ca817
  */
 #include "vortices3.h"
 
@@ -760,7 +760,19 @@ static int vortices3_solve(double matrix[36], double side[6])
     return 1;
 }
 
-/* The guess for the next value (y), from earlier ones; 0 if there are none. */
+/* Whether a guess is where the next values may be. Recurrences that were fitted to little else than rest, near a saddle,
+   may lead anywhere; and far away the equation of a step has solutions that have nothing to do with the motion. */
+static int vortices3_near(const double guess[6], const double last[6])
+{
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < 6; ++i) {
+        distance += fabs(guess[i] - last[i]);
+        size += fabs(last[i]);
+    }
+    return distance <= 4.0 * size;
+}
+
+/* The guess for the next value (y), from earlier ones; 0 if there is none. */
 static int vortices3_predict(const vortices3_memory *memory, double value[6])
 {
     const int last = memory->count - 1;
@@ -779,7 +791,7 @@ static int vortices3_predict(const vortices3_memory *memory, double value[6])
             for (int i = 0; i < 6; ++i) value[i] += binomial * memory->past[last - k][i];
         }
     }
-    return last >= 0;
+    return last >= 0 && vortices3_near(value, memory->past[last]);
 }
 
 /* Choose the guess that would have been best for a value that took several iterations. */
@@ -1927,7 +1939,7 @@ static void vortices3_correct(vortices3_lines *line, vortices3_lanes size)
         for (int lane = 0; lane < vortices3_LANES; ++lane) line->y[i][lane] -= delta[i][lane];
 }
 
-/* The largest size; infinite if one is not finite. As integers, the bits of numbers that are not negative have their
+/* The largest of the lanes, which are not negative; infinite if one is not finite. As integers, the bits of numbers that are not negative have their
    order, and those of what is no number are larger. */
 static double vortices3_largest(const vortices3_lanes size)
 {
@@ -1937,6 +1949,19 @@ static double vortices3_largest(const vortices3_lanes size)
     for (int lane = 0; lane < vortices3_LANES; ++lane) most = bits[lane] > most ? bits[lane] : most;
     memcpy(&largest, &most, sizeof largest);
     return isfinite(largest) ? largest : HUGE_VAL;
+}
+
+/* vortices3_near for the guesses of all lanes, seen from one value. */
+static int vortices3_near_lanes(vortices3_lanes y[restrict 6], const double last[6])
+{
+    vortices3_lanes distance = { 0.0 };
+    double size = 0.0;
+    for (int i = 0; i < 6; ++i) {
+        size += fabs(last[i]);
+        vortices3_EACH_LANE
+        for (int lane = 0; lane < vortices3_LANES; ++lane) distance[lane] += fabs(y[i][lane] - last[i]);
+    }
+    return vortices3_largest(distance) <= 4.0 * size;
 }
 
 /* What is left after a correction of this size: quadratic in it, where the matrices are of the points corrected; where
@@ -2063,8 +2088,10 @@ static int vortices3_block(vortices3_solver *s, vortices3_table *table, int most
     double x[6], carry[6], value[6], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
     if (!s->foreseeing) vortices3_march(s, table, line);
-    for (int stage = 0; stage < 1 && s->foreseeing; ++stage)
-        vortices3_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
+    for (int stage = 0; stage < 1; ++stage) {
+        if (s->foreseeing) vortices3_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
+        if (!vortices3_near_lanes(line[stage].y, s->x)) return 0;
+    }
     while (!solved) {
         double size = 0.0;
         const int matrices = previous > 1e-05;
@@ -2298,6 +2325,21 @@ static int vortices3_group_open(vortices3_group *group, const vortices3_lanes si
     return open;
 }
 
+/* The guess for a stage: recurrences, or extrapolation; the state for members where that is not near. */
+static void vortices3_group_predict(vortices3_group *group, int stage, vortices3_lanes y[6])
+{
+    if (group->fitting[stage]) vortices3_group_foresee(group, stage, y);
+    else vortices3_group_extrapolate(group, stage, y);
+    for (int lane = 0; lane < vortices3_LANES; ++lane) {
+        double distance = 0.0, size = 0.0;
+        for (int i = 0; i < 6; ++i) {
+            distance += fabs(y[i][lane] - group->x[i][lane]);
+            size += fabs(group->x[i][lane]);
+        }
+        for (int i = 0; i < 6 && !(distance <= 4.0 * size); ++i) y[i][lane] = group->x[i][lane];
+    }
+}
+
 /* Newton's method for a stage, until the slowest lane is solved. The number of iterations; where that is the most
    allowed, lanes that are not solved leave the group. */
 static int vortices3_group_solve(vortices3_group *group, int stage, vortices3_lines *line)
@@ -2306,8 +2348,7 @@ static int vortices3_group_solve(vortices3_group *group, int stage, vortices3_li
     double largest = HUGE_VAL, bend = 0.0;
     int iterations = 0, open = 1;
     for (int lane = 0; lane < vortices3_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
-    if (group->fitting[stage]) vortices3_group_foresee(group, stage, line->y);
-    else vortices3_group_extrapolate(group, stage, line->y);
+    vortices3_group_predict(group, stage, line->y);
     for (; open > 0 && iterations < 20; ++iterations) {
         memcpy(previous, size, sizeof size);
         vortices3_update(group->coef[stage], line, largest > 1e-05);

@@ -21,6 +21,9 @@ WINDOW, FITTED, SMALLEST = 32, 96, 30
 #: Steps that a fit costs, about; with the recurrences for whole blocks, four times as many are saved in.
 REPAY = 1000
 
+#: How far from the last value a guess may be, in sizes of that value.
+REACH = 4.0
+
 #: Values that the history of a solver may hold in all.
 MOST_HISTORY = 8_000
 
@@ -99,6 +102,7 @@ def _memory_values(program: Program) -> dict[str, object]:
         "fitted": fitted,
         "kept": 2 * fitted,
         "repay": REPAY,
+        "reach": repr(REACH),
         "most_repay": 4 * REPAY,
         "window": 2 * (fitted * WINDOW // FITTED // 2),
         "ahead": ahead,

@@ -116,6 +116,7 @@ def pieces(program: Program, values: Mapping[str, object]) -> list[str]:
     templates = [
         "sizes",
         "correct",
+        "near_lanes",
         "solved",
         "chain",
         "block",
