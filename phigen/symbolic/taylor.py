@@ -9,7 +9,7 @@ Hamilton–Jacobi recursion compute each coefficient once.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Sequence, Sized
 from fractions import Fraction
 from typing import Any, Protocol
 
@@ -27,6 +27,9 @@ from phigen.symbolic.expression import (
     total,
 )
 from phigen.symbolic.special import SPECIAL, coefficient, order_of
+
+#: Terms of two polynomials that are still multiplied, as a product of counts: tenths of a second.
+MOST_PRODUCTS = 1_000_000
 
 
 class Ring(Protocol):
@@ -97,6 +100,13 @@ def _by_derivative(e: Expression) -> bool:
     return bool(e.args) and e.op not in ("add", "sub", "neg", "mul", "pow", *SPECIAL)
 
 
+def product(a: Any, b: Any) -> Any:
+    """a·b. Raises `OverflowError` rather than multiply polynomials with too many terms for memory."""
+    if isinstance(a, Sized) and isinstance(b, Sized) and len(a) * len(b) > MOST_PRODUCTS:
+        raise OverflowError(f"a product of polynomials with {len(a)} and {len(b)} terms")
+    return a * b
+
+
 class Taylor:
     """Series in t of the nodes of some expressions; ``series[id(node)]`` lists the coefficients so far."""
 
@@ -147,9 +157,9 @@ class Taylor:
     def _convolve(self, a: list[Any], b: list[Any], i: int) -> Any:
         zero = self.ring.vanishes
         if a is b:
-            pairs = [a[j] * a[i - j] * self.ring.constant(2) for j in range((i + 1) // 2) if not zero(a[j])]
-            return self.ring.combine(pairs + ([a[i // 2] * a[i // 2]] if i % 2 == 0 else []))
-        return self.ring.combine([a[j] * b[i - j] for j in range(i + 1) if not (zero(a[j]) or zero(b[i - j]))])
+            pairs = [product(a[j], a[i - j]) * self.ring.constant(2) for j in range((i + 1) // 2) if not zero(a[j])]
+            return self.ring.combine(pairs + ([product(a[i // 2], a[i // 2])] if i % 2 == 0 else []))
+        return self.ring.combine([product(a[j], b[i - j]) for j in range(i + 1) if not (zero(a[j]) or zero(b[i - j]))])
 
     def _power(self, e: Expression, a: list[Any], i: int) -> Any:
         exponent: Fraction = e.value
@@ -160,7 +170,7 @@ class Taylor:
         # c = a**r satisfies a·c' = r·a'·c.
         own, zero = self.series[id(e)], self.ring.vanishes
         terms = [
-            a[j] * own[i - j] * self.ring.constant((exponent * j - (i - j)) / i)
+            product(a[j], own[i - j]) * self.ring.constant((exponent * j - (i - j)) / i)
             for j in range(1, i + 1)
             if not (zero(a[j]) or zero(own[i - j]))
         ]
@@ -186,7 +196,7 @@ class Taylor:
         for partial, a in zip(partials(e), args, strict=True):
             d = self.series[id(partial)]
             terms += [
-                a[j] * d[i - j] * self.ring.constant(Fraction(j, i))
+                product(a[j], d[i - j]) * self.ring.constant(Fraction(j, i))
                 for j in range(1, i + 1)
                 if not (zero(a[j]) or zero(d[i - j]))
             ]

@@ -275,3 +275,11 @@ def test_as_many_terms_as_were_asked_for(terms):
     graph = graph_series((q**2 + p**2) / 2, MIDPOINT, ("q", "p"), terms, symmetric=True)
     assert all(isinstance(term, Expression) for term in graph)
     assert all(term is ZERO for term in graph[1::2])
+
+
+def test_nested_definitions_are_left_unexpanded():
+    """Expanded, the derivatives of thirteen nested sines have 2^13 terms, and their products take all memory."""
+    lines = [f"  a{k}: a{k - 1} + sin(a{k - 1})" if k else "  a0: q + sin(p)" for k in range(13)]
+    canonical = "coordinates: [q, p]\npoisson: {canonical: {q: [q], p: [p]}}\n"
+    text = canonical + "definitions:\n" + "\n".join(lines) + "\nhamiltonian: p**2/2 + a12\norder: 4\n"
+    assert compile_text(text).program.operations["functions"] < 100
