@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 19682416bcc378d3af0ebc7130c42d1e958c90c16899a57081e6a838d449a674
+ * body-sha256: 0c5fe5455ea7eda293967ac8349516f9c809d1b0b7b48ecba47b979234492721
  */
 #include "cyclotron.h"
 
@@ -413,6 +413,7 @@ typedef double cyclotron_lanes[cyclotron_LANES];
 
 #if defined(__clang__)
 #define cyclotron_EACH_LANE _Pragma("clang loop vectorize(assume_safety)")
+#pragma clang diagnostic push
 #pragma clang diagnostic ignored "-Wpass-failed"
 #elif defined(__GNUC__)
 #define cyclotron_EACH_LANE _Pragma("GCC ivdep") _Pragma("GCC unroll 1")
@@ -426,12 +427,12 @@ typedef struct {
     cyclotron_lanes coef[1][3], weight[1][32][3];
 } cyclotron_table;
 
-/* A stage in all lanes, linear around y: a residual r of alpha(y) = x takes inverse r from y and gain r from the
+/* A stage in all lanes, linearised around y: a residual r of alpha(y) = x takes inverse r from y and gain r from the
    increment. */
 typedef struct {
     cyclotron_lanes y[3], displacement[3], increment[3], residual[3];
     cyclotron_lanes inverse[9], slope[9], gain[9];
-} cyclotron_lines;
+} cyclotron_model;
 
 /* cyclotron_linearise in all lanes. */
 static void cyclotron_linearise_lanes(cyclotron_lanes coef[restrict 3], cyclotron_lanes y[restrict 3],
@@ -553,15 +554,15 @@ static void cyclotron_invert_lanes(cyclotron_lanes matrix[restrict 9], cyclotron
 }
 
 /* Everything about a stage at the points y. The matrices are I + O(h): where a pivot is far from 1, all is infinite. */
-static void cyclotron_tabulate(cyclotron_lanes coef[restrict], cyclotron_lines *line)
+static void cyclotron_tabulate(cyclotron_lanes coef[restrict], cyclotron_model *model)
 {
     cyclotron_lanes jacobian[9], reciprocal[3];
-    cyclotron_linearise_lanes(coef, line->y, line->displacement, line->increment, jacobian, line->slope);
-    cyclotron_invert_lanes(jacobian, line->slope, line->inverse, line->gain, reciprocal);
+    cyclotron_linearise_lanes(coef, model->y, model->displacement, model->increment, jacobian, model->slope);
+    cyclotron_invert_lanes(jacobian, model->slope, model->inverse, model->gain, reciprocal);
     for (int i = 0; i < 3; ++i) {
         cyclotron_EACH_LANE
         for (int lane = 0; lane < cyclotron_LANES; ++lane)
-            line->inverse[i][lane] += fabs(reciprocal[i][lane]) < 1e3 ? 0.0 : HUGE_VAL;
+            model->inverse[i][lane] += fabs(reciprocal[i][lane]) < 1e3 ? 0.0 : HUGE_VAL;
     }
 }
 
@@ -582,7 +583,7 @@ static void cyclotron_sizes(cyclotron_lanes y[restrict 3], cyclotron_lanes delta
 }
 
 /* Correct y by the residuals, with the inverse in the table, and measure the corrections. */
-static void cyclotron_correct(cyclotron_lines *line, cyclotron_lanes size)
+static void cyclotron_correct(cyclotron_model *model, cyclotron_lanes size)
 {
     cyclotron_lanes delta[3];
     memset(delta, 0, sizeof delta);
@@ -590,15 +591,15 @@ static void cyclotron_correct(cyclotron_lines *line, cyclotron_lanes size)
         for (int j = 0; j < 3; ++j) {
             cyclotron_EACH_LANE
             for (int lane = 0; lane < cyclotron_LANES; ++lane)
-                delta[i][lane] += line->inverse[i * 3 + j][lane] * line->residual[j][lane];
+                delta[i][lane] += model->inverse[i * 3 + j][lane] * model->residual[j][lane];
         }
-    cyclotron_sizes(line->y, delta, size);
+    cyclotron_sizes(model->y, delta, size);
     for (int i = 0; i < 3; ++i)
-        for (int lane = 0; lane < cyclotron_LANES; ++lane) line->y[i][lane] -= delta[i][lane];
+        for (int lane = 0; lane < cyclotron_LANES; ++lane) model->y[i][lane] -= delta[i][lane];
 }
 
-/* The largest of the lanes, which are not negative; infinite if one is not finite. As integers, the bits of numbers that are not negative have their
-   order, and those of what is no number are larger. */
+/* The largest of the lanes, none of which is negative; infinite if one is not finite. As integers, the bits of such
+   numbers have their order, and those of what is no number are larger. */
 static double cyclotron_largest(const cyclotron_lanes size)
 {
     uint64_t bits[8], most = 0;
@@ -631,27 +632,27 @@ static double cyclotron_remaining(double size, double bend, double bound)
 }
 
 /* The table of a stage, with its matrices or with those of the last pass. */
-static void cyclotron_update(cyclotron_lanes coef[restrict], cyclotron_lines *line, int matrices)
+static void cyclotron_update(cyclotron_lanes coef[restrict], cyclotron_model *model, int matrices)
 {
     if (matrices)
-        cyclotron_tabulate(coef, line);
+        cyclotron_tabulate(coef, model);
     else
-        cyclotron_evaluate_lanes(coef, line->y, line->displacement, line->increment);
+        cyclotron_evaluate_lanes(coef, model->y, model->displacement, model->increment);
 }
 
-/* The steps of a block one after the other, each along the lines of its lane. As X, the state with its carry, gains
+/* The steps of a block one after the other, each along the linear model of its lane. As X, the state with its carry, gains
    increment - gain residual, the next residual follows from this one; X itself is added up apart. */
-static void cyclotron_chain(cyclotron_lines line[1], double x[3], double carry[3])
+static void cyclotron_chain(cyclotron_model model[1], double x[3], double carry[3])
 {
     double residual[3], sum[3], small[3];
     for (int i = 0; i < 3; ++i) {
-        residual[i] = ((line->y[i][0] - x[i]) + line->displacement[i][0]) - carry[i];
+        residual[i] = ((model->y[i][0] - x[i]) + model->displacement[i][0]) - carry[i];
         sum[i] = x[i];
         small[i] = carry[i];
     }
     for (int k = 0; k < 1 * cyclotron_LANES; ++k) {
         const int lane = k / 1, after = (k + 1) / 1 % cyclotron_LANES;
-        cyclotron_lines *at = &line[k % 1], *next = &line[(k + 1) % 1];
+        cyclotron_model *at = &model[k % 1], *next = &model[(k + 1) % 1];
         double even[3] = { 0.0 }, odd[3] = { 0.0 }; /* two sums, so that no long chain of additions is waited for */
         for (int i = 0; i < 3; ++i) {
             at->residual[i][lane] = residual[i];
@@ -673,8 +674,8 @@ static void cyclotron_chain(cyclotron_lines line[1], double x[3], double carry[3
     }
 }
 
-/* Bring the table up to date. */
-static void cyclotron_tell(const cyclotron_solver *s, cyclotron_table *table)
+/* Bring the table up to date: coefficients, and weights that were fitted since. */
+static void cyclotron_refresh(const cyclotron_solver *s, cyclotron_table *table)
 {
     for (int stage = 0; stage < 1; ++stage) {
         if (table->fits[stage] == s->memory[stage].fits) continue;
@@ -705,7 +706,7 @@ static void cyclotron_foresee(const cyclotron_memory *memory, cyclotron_lanes we
 
 /* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
    method, to leading order. */
-static void cyclotron_march(const cyclotron_solver *s, cyclotron_table *table, cyclotron_lines line[1])
+static void cyclotron_march(const cyclotron_solver *s, cyclotron_table *table, cyclotron_model model[1])
 {
     static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
     double x[3], point[3], slope[3], mean[3];
@@ -722,12 +723,12 @@ static void cyclotron_march(const cyclotron_solver *s, cyclotron_table *table, c
             }
         }
         for (int i = 0; i < 3; ++i) {
-            line[k % 1].y[i][k / 1] = x[i] + 0.5 * h * mean[i];
+            model[k % 1].y[i][k / 1] = x[i] + 0.5 * h * mean[i];
             x[i] += h * mean[i];
         }
     }
     for (int stage = 0; stage < 1; ++stage) {
-        cyclotron_lines *at = &line[stage];
+        cyclotron_model *at = &model[stage];
         cyclotron_evaluate_lanes(table->coef[stage], at->y, at->displacement, at->increment);
         for (int i = 0; i < 3; ++i) {
             cyclotron_EACH_LANE
@@ -741,24 +742,24 @@ static void cyclotron_march(const cyclotron_solver *s, cyclotron_table *table, c
    small as after a single step. How many passes that took; 0, and the solver as before, where it takes more than most. */
 static int cyclotron_block(cyclotron_solver *s, cyclotron_table *table, int most)
 {
-    cyclotron_lines line[1];
+    cyclotron_model model[1];
     cyclotron_lanes sizes;
     double x[3], carry[3], value[3], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
-    if (!s->foreseeing) cyclotron_march(s, table, line);
+    if (!s->foreseeing) cyclotron_march(s, table, model);
     for (int stage = 0; stage < 1; ++stage) {
-        if (s->foreseeing) cyclotron_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
-        if (!cyclotron_near_lanes(line[stage].y, s->x)) return 0;
+        if (s->foreseeing) cyclotron_foresee(&s->memory[stage], table->weight[stage], model[stage].y);
+        if (!cyclotron_near_lanes(model[stage].y, s->x)) return 0;
     }
     while (!solved) {
         double size = 0.0;
         const int matrices = previous > 1e-05;
-        for (int stage = 0; stage < 1; ++stage) cyclotron_update(table->coef[stage], &line[stage], matrices);
+        for (int stage = 0; stage < 1; ++stage) cyclotron_update(table->coef[stage], &model[stage], matrices);
         memcpy(x, s->x, sizeof x);
         memcpy(carry, s->carry, sizeof carry);
-        cyclotron_chain(line, x, carry);
+        cyclotron_chain(model, x, carry);
         for (int stage = 0; stage < 1; ++stage) {
-            cyclotron_correct(&line[stage], sizes);
+            cyclotron_correct(&model[stage], sizes);
             const double largest = cyclotron_largest(sizes);
             size = largest > size ? largest : size;
         }
@@ -778,7 +779,7 @@ static int cyclotron_block(cyclotron_solver *s, cyclotron_table *table, int most
     for (int stage = 0; stage < 1; ++stage) {
         cyclotron_memory *memory = &s->memory[stage];
         for (int lane = 0; lane < cyclotron_LANES; ++lane) {
-            for (int i = 0; i < 3; ++i) value[i] = line[stage].y[i][lane];
+            for (int i = 0; i < 3; ++i) value[i] = model[stage].y[i][lane];
             cyclotron_record(memory, value);
         }
         memory->slow = passes > 1 ? memory->slow + cyclotron_LANES : 0;
@@ -840,7 +841,7 @@ cyclotron_status cyclotron_integrate(cyclotron_solver *s, double h, size_t steps
     while (status == cyclotron_OK && steps > 0) {
         if (steps >= cyclotron_LANES && s->pause == 0) cyclotron_choose_guess(s, steps);
         if (steps >= cyclotron_LANES && s->pause == 0) {
-            cyclotron_tell(s, &table);
+            cyclotron_refresh(s, &table);
             const int passes = cyclotron_block(s, &table, (int)(2 * s->effort + 0.5));
             cyclotron_learn_from(s, passes);
             if (passes > 0) steps -= cyclotron_LANES;
@@ -1000,24 +1001,24 @@ static void cyclotron_group_predict(cyclotron_group *group, int stage, cyclotron
 
 /* Newton's method for a stage, until the slowest lane is solved. The number of iterations; where that is the most
    allowed, lanes that are not solved leave the group. */
-static int cyclotron_group_solve(cyclotron_group *group, int stage, cyclotron_lines *line)
+static int cyclotron_group_solve(cyclotron_group *group, int stage, cyclotron_model *model)
 {
     cyclotron_lanes size, previous, bound;
     double largest = HUGE_VAL, bend = 0.0;
     int iterations = 0, open = 1;
     for (int lane = 0; lane < cyclotron_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
-    cyclotron_group_predict(group, stage, line->y);
+    cyclotron_group_predict(group, stage, model->y);
     for (; open > 0 && iterations < 20; ++iterations) {
         memcpy(previous, size, sizeof size);
-        cyclotron_update(group->coef[stage], line, largest > 1e-05);
+        cyclotron_update(group->coef[stage], model, largest > 1e-05);
         bend = largest > 1e-05 ? 0.0 : bend + largest;
         for (int i = 0; i < 3; ++i) {
             cyclotron_EACH_LANE
             for (int lane = 0; lane < cyclotron_LANES; ++lane)
-                line->residual[i][lane] =
-                    ((line->y[i][lane] - group->x[i][lane]) + line->displacement[i][lane]) - group->carry[i][lane];
+                model->residual[i][lane] =
+                    ((model->y[i][lane] - group->x[i][lane]) + model->displacement[i][lane]) - group->carry[i][lane];
         }
-        cyclotron_correct(line, size);
+        cyclotron_correct(model, size);
         open = cyclotron_group_open(group, size, previous, bend, bound);
         largest = cyclotron_largest(size);
     }
@@ -1028,18 +1029,18 @@ static int cyclotron_group_solve(cyclotron_group *group, int stage, cyclotron_li
 
 /* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
 static void cyclotron_group_advance(cyclotron_lanes x[restrict 3], cyclotron_lanes carry[restrict 3],
-    cyclotron_lines *line)
+    cyclotron_model *model)
 {
     for (int i = 0; i < 3; ++i)
         for (int j = 0; j < 3; ++j) {
             cyclotron_EACH_LANE
             for (int lane = 0; lane < cyclotron_LANES; ++lane)
-                carry[i][lane] -= line->gain[i * 3 + j][lane] * line->residual[j][lane];
+                carry[i][lane] -= model->gain[i * 3 + j][lane] * model->residual[j][lane];
         }
     for (int i = 0; i < 3; ++i) {
         cyclotron_EACH_LANE
         for (int lane = 0; lane < cyclotron_LANES; ++lane) {
-            const double change = line->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
+            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
             const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
             x[i][lane] = sum + small;
             carry[i][lane] = small - (x[i][lane] - sum);
@@ -1051,17 +1052,17 @@ static void cyclotron_group_advance(cyclotron_lanes x[restrict 3], cyclotron_lan
 static int cyclotron_group_step(cyclotron_group *group, size_t remaining)
 {
     cyclotron_lanes x[3], carry[3];
-    cyclotron_lines line;
+    cyclotron_model model;
     const int next = (group->latest + 96 - 1) % 96;
     int active = 0, most = 0;
     memcpy(x, group->x, sizeof x);
     memcpy(carry, group->carry, sizeof carry);
     for (int stage = 0; stage < 1; ++stage) {
-        const int iterations = cyclotron_group_solve(group, stage, &line);
-        cyclotron_group_advance(group->x, group->carry, &line);
-        if (next % 8 == 0 || group->count < 8) cyclotron_group_judge(group, stage, line.y);
+        const int iterations = cyclotron_group_solve(group, stage, &model);
+        cyclotron_group_advance(group->x, group->carry, &model);
+        if (next % 8 == 0 || group->count < 8) cyclotron_group_judge(group, stage, model.y);
         if (iterations > most) most = iterations;
-        memcpy(group->past[stage][next], line.y, sizeof line.y);
+        memcpy(group->past[stage][next], model.y, sizeof model.y);
     }
     group->latest = next;
     if (group->count < 96) ++group->count;
@@ -1158,6 +1159,10 @@ cyclotron_status cyclotron_ensemble(const cyclotron_params *params, double *x, s
     }
     return worst;
 }
+
+#if defined(__clang__)
+#pragma clang diagnostic pop
+#endif
 
 /* the Hamiltonian */
 static void cyclotron_energy(const cyclotron_params *params, const double x[3], double energy[restrict 1])

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 28c73cdd201cf030b995c13d225e5f4b4360792aa12e0ea0c6c07aef816bec69
+ * body-sha256: b80ef967a8087b256ddfb5032e9eed8e49bf2b89883a805b539d20359cd84bc1
  */
 #ifndef CYCLOTRON_H
 #define CYCLOTRON_H
@@ -71,7 +71,7 @@ typedef struct {
     int pause;      /* steps to make singly before a block is tried */
     int setback;    /* the last pause, halved with every block that succeeds */
     int foreseeing; /* whether blocks are guessed by recurrences */
-    int passes;     /* that the last block took which was not */
+    int passes;     /* that the last block took which was guessed by Runge-Kutta steps */
     size_t doubt;   /* steps to wait before recurrences are tried again */
     size_t retry;   /* steps after which that is */
     double coef[1][3]; /* what depends on params and h only, for each stage */

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: b28622386dc0a71d156f5a0a1aded4c35a581b5f7203cfe6ab2b37bcd31312f5
+ * body-sha256: b420a98abfb821f3e22df858228d7e2768d369ab2d129e11f2399be6b3434c61
  */
 #include "engel_geodesics.h"
 
@@ -454,6 +454,7 @@ typedef double engel_geodesics_lanes[engel_geodesics_LANES];
 
 #if defined(__clang__)
 #define engel_geodesics_EACH_LANE _Pragma("clang loop vectorize(assume_safety)")
+#pragma clang diagnostic push
 #pragma clang diagnostic ignored "-Wpass-failed"
 #elif defined(__GNUC__)
 #define engel_geodesics_EACH_LANE _Pragma("GCC ivdep") _Pragma("GCC unroll 1")
@@ -467,12 +468,12 @@ typedef struct {
     engel_geodesics_lanes coef[1][3], weight[1][32][4];
 } engel_geodesics_table;
 
-/* A stage in all lanes, linear around y: a residual r of alpha(y) = x takes inverse r from y and gain r from the
+/* A stage in all lanes, linearised around y: a residual r of alpha(y) = x takes inverse r from y and gain r from the
    increment. */
 typedef struct {
     engel_geodesics_lanes y[4], displacement[4], increment[4], residual[4];
     engel_geodesics_lanes inverse[16], slope[16], gain[16];
-} engel_geodesics_lines;
+} engel_geodesics_model;
 
 /* engel_geodesics_linearise in all lanes. */
 static void engel_geodesics_linearise_lanes(engel_geodesics_lanes coef[restrict 3],
@@ -665,15 +666,15 @@ static void engel_geodesics_invert_lanes(engel_geodesics_lanes matrix[restrict 1
 }
 
 /* Everything about a stage at the points y. The matrices are I + O(h): where a pivot is far from 1, all is infinite. */
-static void engel_geodesics_tabulate(engel_geodesics_lanes coef[restrict], engel_geodesics_lines *line)
+static void engel_geodesics_tabulate(engel_geodesics_lanes coef[restrict], engel_geodesics_model *model)
 {
     engel_geodesics_lanes jacobian[16], reciprocal[4];
-    engel_geodesics_linearise_lanes(coef, line->y, line->displacement, line->increment, jacobian, line->slope);
-    engel_geodesics_invert_lanes(jacobian, line->slope, line->inverse, line->gain, reciprocal);
+    engel_geodesics_linearise_lanes(coef, model->y, model->displacement, model->increment, jacobian, model->slope);
+    engel_geodesics_invert_lanes(jacobian, model->slope, model->inverse, model->gain, reciprocal);
     for (int i = 0; i < 4; ++i) {
         engel_geodesics_EACH_LANE
         for (int lane = 0; lane < engel_geodesics_LANES; ++lane)
-            line->inverse[i][lane] += fabs(reciprocal[i][lane]) < 1e3 ? 0.0 : HUGE_VAL;
+            model->inverse[i][lane] += fabs(reciprocal[i][lane]) < 1e3 ? 0.0 : HUGE_VAL;
     }
 }
 
@@ -694,7 +695,7 @@ static void engel_geodesics_sizes(engel_geodesics_lanes y[restrict 4], engel_geo
 }
 
 /* Correct y by the residuals, with the inverse in the table, and measure the corrections. */
-static void engel_geodesics_correct(engel_geodesics_lines *line, engel_geodesics_lanes size)
+static void engel_geodesics_correct(engel_geodesics_model *model, engel_geodesics_lanes size)
 {
     engel_geodesics_lanes delta[4];
     memset(delta, 0, sizeof delta);
@@ -702,15 +703,15 @@ static void engel_geodesics_correct(engel_geodesics_lines *line, engel_geodesics
         for (int j = 0; j < 4; ++j) {
             engel_geodesics_EACH_LANE
             for (int lane = 0; lane < engel_geodesics_LANES; ++lane)
-                delta[i][lane] += line->inverse[i * 4 + j][lane] * line->residual[j][lane];
+                delta[i][lane] += model->inverse[i * 4 + j][lane] * model->residual[j][lane];
         }
-    engel_geodesics_sizes(line->y, delta, size);
+    engel_geodesics_sizes(model->y, delta, size);
     for (int i = 0; i < 4; ++i)
-        for (int lane = 0; lane < engel_geodesics_LANES; ++lane) line->y[i][lane] -= delta[i][lane];
+        for (int lane = 0; lane < engel_geodesics_LANES; ++lane) model->y[i][lane] -= delta[i][lane];
 }
 
-/* The largest of the lanes, which are not negative; infinite if one is not finite. As integers, the bits of numbers that are not negative have their
-   order, and those of what is no number are larger. */
+/* The largest of the lanes, none of which is negative; infinite if one is not finite. As integers, the bits of such
+   numbers have their order, and those of what is no number are larger. */
 static double engel_geodesics_largest(const engel_geodesics_lanes size)
 {
     uint64_t bits[8], most = 0;
@@ -743,27 +744,27 @@ static double engel_geodesics_remaining(double size, double bend, double bound)
 }
 
 /* The table of a stage, with its matrices or with those of the last pass. */
-static void engel_geodesics_update(engel_geodesics_lanes coef[restrict], engel_geodesics_lines *line, int matrices)
+static void engel_geodesics_update(engel_geodesics_lanes coef[restrict], engel_geodesics_model *model, int matrices)
 {
     if (matrices)
-        engel_geodesics_tabulate(coef, line);
+        engel_geodesics_tabulate(coef, model);
     else
-        engel_geodesics_evaluate_lanes(coef, line->y, line->displacement, line->increment);
+        engel_geodesics_evaluate_lanes(coef, model->y, model->displacement, model->increment);
 }
 
-/* The steps of a block one after the other, each along the lines of its lane. As X, the state with its carry, gains
+/* The steps of a block one after the other, each along the linear model of its lane. As X, the state with its carry, gains
    increment - gain residual, the next residual follows from this one; X itself is added up apart. */
-static void engel_geodesics_chain(engel_geodesics_lines line[1], double x[4], double carry[4])
+static void engel_geodesics_chain(engel_geodesics_model model[1], double x[4], double carry[4])
 {
     double residual[4], sum[4], small[4];
     for (int i = 0; i < 4; ++i) {
-        residual[i] = ((line->y[i][0] - x[i]) + line->displacement[i][0]) - carry[i];
+        residual[i] = ((model->y[i][0] - x[i]) + model->displacement[i][0]) - carry[i];
         sum[i] = x[i];
         small[i] = carry[i];
     }
     for (int k = 0; k < 1 * engel_geodesics_LANES; ++k) {
         const int lane = k / 1, after = (k + 1) / 1 % engel_geodesics_LANES;
-        engel_geodesics_lines *at = &line[k % 1], *next = &line[(k + 1) % 1];
+        engel_geodesics_model *at = &model[k % 1], *next = &model[(k + 1) % 1];
         double even[4] = { 0.0 }, odd[4] = { 0.0 }; /* two sums, so that no long chain of additions is waited for */
         for (int i = 0; i < 4; ++i) {
             at->residual[i][lane] = residual[i];
@@ -785,8 +786,8 @@ static void engel_geodesics_chain(engel_geodesics_lines line[1], double x[4], do
     }
 }
 
-/* Bring the table up to date. */
-static void engel_geodesics_tell(const engel_geodesics_solver *s, engel_geodesics_table *table)
+/* Bring the table up to date: coefficients, and weights that were fitted since. */
+static void engel_geodesics_refresh(const engel_geodesics_solver *s, engel_geodesics_table *table)
 {
     for (int stage = 0; stage < 1; ++stage) {
         if (table->fits[stage] == s->memory[stage].fits) continue;
@@ -817,7 +818,7 @@ static void engel_geodesics_foresee(const engel_geodesics_memory *memory, engel_
 
 /* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
    method, to leading order. */
-static void engel_geodesics_march(const engel_geodesics_solver *s, engel_geodesics_table *table, engel_geodesics_lines line[1])
+static void engel_geodesics_march(const engel_geodesics_solver *s, engel_geodesics_table *table, engel_geodesics_model model[1])
 {
     static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
     double x[4], point[4], slope[4], mean[4];
@@ -834,12 +835,12 @@ static void engel_geodesics_march(const engel_geodesics_solver *s, engel_geodesi
             }
         }
         for (int i = 0; i < 4; ++i) {
-            line[k % 1].y[i][k / 1] = x[i] + 0.5 * h * mean[i];
+            model[k % 1].y[i][k / 1] = x[i] + 0.5 * h * mean[i];
             x[i] += h * mean[i];
         }
     }
     for (int stage = 0; stage < 1; ++stage) {
-        engel_geodesics_lines *at = &line[stage];
+        engel_geodesics_model *at = &model[stage];
         engel_geodesics_evaluate_lanes(table->coef[stage], at->y, at->displacement, at->increment);
         for (int i = 0; i < 4; ++i) {
             engel_geodesics_EACH_LANE
@@ -853,24 +854,24 @@ static void engel_geodesics_march(const engel_geodesics_solver *s, engel_geodesi
    small as after a single step. How many passes that took; 0, and the solver as before, where it takes more than most. */
 static int engel_geodesics_block(engel_geodesics_solver *s, engel_geodesics_table *table, int most)
 {
-    engel_geodesics_lines line[1];
+    engel_geodesics_model model[1];
     engel_geodesics_lanes sizes;
     double x[4], carry[4], value[4], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
-    if (!s->foreseeing) engel_geodesics_march(s, table, line);
+    if (!s->foreseeing) engel_geodesics_march(s, table, model);
     for (int stage = 0; stage < 1; ++stage) {
-        if (s->foreseeing) engel_geodesics_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
-        if (!engel_geodesics_near_lanes(line[stage].y, s->x)) return 0;
+        if (s->foreseeing) engel_geodesics_foresee(&s->memory[stage], table->weight[stage], model[stage].y);
+        if (!engel_geodesics_near_lanes(model[stage].y, s->x)) return 0;
     }
     while (!solved) {
         double size = 0.0;
         const int matrices = previous > 1e-05;
-        for (int stage = 0; stage < 1; ++stage) engel_geodesics_update(table->coef[stage], &line[stage], matrices);
+        for (int stage = 0; stage < 1; ++stage) engel_geodesics_update(table->coef[stage], &model[stage], matrices);
         memcpy(x, s->x, sizeof x);
         memcpy(carry, s->carry, sizeof carry);
-        engel_geodesics_chain(line, x, carry);
+        engel_geodesics_chain(model, x, carry);
         for (int stage = 0; stage < 1; ++stage) {
-            engel_geodesics_correct(&line[stage], sizes);
+            engel_geodesics_correct(&model[stage], sizes);
             const double largest = engel_geodesics_largest(sizes);
             size = largest > size ? largest : size;
         }
@@ -890,7 +891,7 @@ static int engel_geodesics_block(engel_geodesics_solver *s, engel_geodesics_tabl
     for (int stage = 0; stage < 1; ++stage) {
         engel_geodesics_memory *memory = &s->memory[stage];
         for (int lane = 0; lane < engel_geodesics_LANES; ++lane) {
-            for (int i = 0; i < 4; ++i) value[i] = line[stage].y[i][lane];
+            for (int i = 0; i < 4; ++i) value[i] = model[stage].y[i][lane];
             engel_geodesics_record(memory, value);
         }
         memory->slow = passes > 1 ? memory->slow + engel_geodesics_LANES : 0;
@@ -952,7 +953,7 @@ engel_geodesics_status engel_geodesics_integrate(engel_geodesics_solver *s, doub
     while (status == engel_geodesics_OK && steps > 0) {
         if (steps >= engel_geodesics_LANES && s->pause == 0) engel_geodesics_choose_guess(s, steps);
         if (steps >= engel_geodesics_LANES && s->pause == 0) {
-            engel_geodesics_tell(s, &table);
+            engel_geodesics_refresh(s, &table);
             const int passes = engel_geodesics_block(s, &table, (int)(2 * s->effort + 0.5));
             engel_geodesics_learn_from(s, passes);
             if (passes > 0) steps -= engel_geodesics_LANES;
@@ -1112,24 +1113,24 @@ static void engel_geodesics_group_predict(engel_geodesics_group *group, int stag
 
 /* Newton's method for a stage, until the slowest lane is solved. The number of iterations; where that is the most
    allowed, lanes that are not solved leave the group. */
-static int engel_geodesics_group_solve(engel_geodesics_group *group, int stage, engel_geodesics_lines *line)
+static int engel_geodesics_group_solve(engel_geodesics_group *group, int stage, engel_geodesics_model *model)
 {
     engel_geodesics_lanes size, previous, bound;
     double largest = HUGE_VAL, bend = 0.0;
     int iterations = 0, open = 1;
     for (int lane = 0; lane < engel_geodesics_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
-    engel_geodesics_group_predict(group, stage, line->y);
+    engel_geodesics_group_predict(group, stage, model->y);
     for (; open > 0 && iterations < 20; ++iterations) {
         memcpy(previous, size, sizeof size);
-        engel_geodesics_update(group->coef[stage], line, largest > 1e-05);
+        engel_geodesics_update(group->coef[stage], model, largest > 1e-05);
         bend = largest > 1e-05 ? 0.0 : bend + largest;
         for (int i = 0; i < 4; ++i) {
             engel_geodesics_EACH_LANE
             for (int lane = 0; lane < engel_geodesics_LANES; ++lane)
-                line->residual[i][lane] =
-                    ((line->y[i][lane] - group->x[i][lane]) + line->displacement[i][lane]) - group->carry[i][lane];
+                model->residual[i][lane] =
+                    ((model->y[i][lane] - group->x[i][lane]) + model->displacement[i][lane]) - group->carry[i][lane];
         }
-        engel_geodesics_correct(line, size);
+        engel_geodesics_correct(model, size);
         open = engel_geodesics_group_open(group, size, previous, bend, bound);
         largest = engel_geodesics_largest(size);
     }
@@ -1140,18 +1141,18 @@ static int engel_geodesics_group_solve(engel_geodesics_group *group, int stage, 
 
 /* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
 static void engel_geodesics_group_advance(engel_geodesics_lanes x[restrict 4], engel_geodesics_lanes carry[restrict 4],
-    engel_geodesics_lines *line)
+    engel_geodesics_model *model)
 {
     for (int i = 0; i < 4; ++i)
         for (int j = 0; j < 4; ++j) {
             engel_geodesics_EACH_LANE
             for (int lane = 0; lane < engel_geodesics_LANES; ++lane)
-                carry[i][lane] -= line->gain[i * 4 + j][lane] * line->residual[j][lane];
+                carry[i][lane] -= model->gain[i * 4 + j][lane] * model->residual[j][lane];
         }
     for (int i = 0; i < 4; ++i) {
         engel_geodesics_EACH_LANE
         for (int lane = 0; lane < engel_geodesics_LANES; ++lane) {
-            const double change = line->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
+            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
             const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
             x[i][lane] = sum + small;
             carry[i][lane] = small - (x[i][lane] - sum);
@@ -1163,17 +1164,17 @@ static void engel_geodesics_group_advance(engel_geodesics_lanes x[restrict 4], e
 static int engel_geodesics_group_step(engel_geodesics_group *group, size_t remaining)
 {
     engel_geodesics_lanes x[4], carry[4];
-    engel_geodesics_lines line;
+    engel_geodesics_model model;
     const int next = (group->latest + 96 - 1) % 96;
     int active = 0, most = 0;
     memcpy(x, group->x, sizeof x);
     memcpy(carry, group->carry, sizeof carry);
     for (int stage = 0; stage < 1; ++stage) {
-        const int iterations = engel_geodesics_group_solve(group, stage, &line);
-        engel_geodesics_group_advance(group->x, group->carry, &line);
-        if (next % 8 == 0 || group->count < 8) engel_geodesics_group_judge(group, stage, line.y);
+        const int iterations = engel_geodesics_group_solve(group, stage, &model);
+        engel_geodesics_group_advance(group->x, group->carry, &model);
+        if (next % 8 == 0 || group->count < 8) engel_geodesics_group_judge(group, stage, model.y);
         if (iterations > most) most = iterations;
-        memcpy(group->past[stage][next], line.y, sizeof line.y);
+        memcpy(group->past[stage][next], model.y, sizeof model.y);
     }
     group->latest = next;
     if (group->count < 96) ++group->count;
@@ -1270,6 +1271,10 @@ engel_geodesics_status engel_geodesics_ensemble(const engel_geodesics_params *pa
     }
     return worst;
 }
+
+#if defined(__clang__)
+#pragma clang diagnostic pop
+#endif
 
 /* the Hamiltonian */
 static void engel_geodesics_energy(const engel_geodesics_params *params, const double x[4],

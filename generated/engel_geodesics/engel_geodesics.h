@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: a8293d59b3676237efd8ea292cc5685815291db2ea62929bebc5bee282253a0a
+ * body-sha256: 357b0e264b6e2e1e34d6ac235ca91b4c52fa67e11b93c20e8c45691bb1f17252
  */
 #ifndef ENGEL_GEODESICS_H
 #define ENGEL_GEODESICS_H
@@ -71,7 +71,7 @@ typedef struct {
     int pause;      /* steps to make singly before a block is tried */
     int setback;    /* the last pause, halved with every block that succeeds */
     int foreseeing; /* whether blocks are guessed by recurrences */
-    int passes;     /* that the last block took which was not */
+    int passes;     /* that the last block took which was guessed by Runge-Kutta steps */
     size_t doubt;   /* steps to wait before recurrences are tried again */
     size_t retry;   /* steps after which that is */
     double coef[1][3]; /* what depends on params and h only, for each stage */

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: f020488f62e19238ec86be1d5d34897816f7b279885e4b4c60b8c016d76cf3ed
+ * body-sha256: b1c49dde9da7c67a385662500b169ae6702d23ca645520e3f00546a04bef5b28
  */
 #include "gaussian_moments.h"
 
@@ -561,6 +561,7 @@ typedef double gaussian_moments_lanes[gaussian_moments_LANES];
 
 #if defined(__clang__)
 #define gaussian_moments_EACH_LANE _Pragma("clang loop vectorize(assume_safety)")
+#pragma clang diagnostic push
 #pragma clang diagnostic ignored "-Wpass-failed"
 #elif defined(__GNUC__)
 #define gaussian_moments_EACH_LANE _Pragma("GCC ivdep") _Pragma("GCC unroll 1")
@@ -574,12 +575,12 @@ typedef struct {
     gaussian_moments_lanes coef[1][14], weight[1][32][3];
 } gaussian_moments_table;
 
-/* A stage in all lanes, linear around y: a residual r of alpha(y) = x takes inverse r from y and gain r from the
+/* A stage in all lanes, linearised around y: a residual r of alpha(y) = x takes inverse r from y and gain r from the
    increment. */
 typedef struct {
     gaussian_moments_lanes y[3], displacement[3], increment[3], residual[3];
     gaussian_moments_lanes inverse[9], slope[9], gain[9];
-} gaussian_moments_lines;
+} gaussian_moments_model;
 
 /* gaussian_moments_phi0 for the loops over lanes: no branches. Infinite beyond |s| = 4.0. */
 static inline double gaussian_moments_phi0_lane(double s)
@@ -793,15 +794,15 @@ static void gaussian_moments_invert_lanes(gaussian_moments_lanes matrix[restrict
 }
 
 /* Everything about a stage at the points y. The matrices are I + O(h): where a pivot is far from 1, all is infinite. */
-static void gaussian_moments_tabulate(gaussian_moments_lanes coef[restrict], gaussian_moments_lines *line)
+static void gaussian_moments_tabulate(gaussian_moments_lanes coef[restrict], gaussian_moments_model *model)
 {
     gaussian_moments_lanes jacobian[9], reciprocal[3];
-    gaussian_moments_linearise_lanes(coef, line->y, line->displacement, line->increment, jacobian, line->slope);
-    gaussian_moments_invert_lanes(jacobian, line->slope, line->inverse, line->gain, reciprocal);
+    gaussian_moments_linearise_lanes(coef, model->y, model->displacement, model->increment, jacobian, model->slope);
+    gaussian_moments_invert_lanes(jacobian, model->slope, model->inverse, model->gain, reciprocal);
     for (int i = 0; i < 3; ++i) {
         gaussian_moments_EACH_LANE
         for (int lane = 0; lane < gaussian_moments_LANES; ++lane)
-            line->inverse[i][lane] += fabs(reciprocal[i][lane]) < 1e3 ? 0.0 : HUGE_VAL;
+            model->inverse[i][lane] += fabs(reciprocal[i][lane]) < 1e3 ? 0.0 : HUGE_VAL;
     }
 }
 
@@ -822,7 +823,7 @@ static void gaussian_moments_sizes(gaussian_moments_lanes y[restrict 3], gaussia
 }
 
 /* Correct y by the residuals, with the inverse in the table, and measure the corrections. */
-static void gaussian_moments_correct(gaussian_moments_lines *line, gaussian_moments_lanes size)
+static void gaussian_moments_correct(gaussian_moments_model *model, gaussian_moments_lanes size)
 {
     gaussian_moments_lanes delta[3];
     memset(delta, 0, sizeof delta);
@@ -830,15 +831,15 @@ static void gaussian_moments_correct(gaussian_moments_lines *line, gaussian_mome
         for (int j = 0; j < 3; ++j) {
             gaussian_moments_EACH_LANE
             for (int lane = 0; lane < gaussian_moments_LANES; ++lane)
-                delta[i][lane] += line->inverse[i * 3 + j][lane] * line->residual[j][lane];
+                delta[i][lane] += model->inverse[i * 3 + j][lane] * model->residual[j][lane];
         }
-    gaussian_moments_sizes(line->y, delta, size);
+    gaussian_moments_sizes(model->y, delta, size);
     for (int i = 0; i < 3; ++i)
-        for (int lane = 0; lane < gaussian_moments_LANES; ++lane) line->y[i][lane] -= delta[i][lane];
+        for (int lane = 0; lane < gaussian_moments_LANES; ++lane) model->y[i][lane] -= delta[i][lane];
 }
 
-/* The largest of the lanes, which are not negative; infinite if one is not finite. As integers, the bits of numbers that are not negative have their
-   order, and those of what is no number are larger. */
+/* The largest of the lanes, none of which is negative; infinite if one is not finite. As integers, the bits of such
+   numbers have their order, and those of what is no number are larger. */
 static double gaussian_moments_largest(const gaussian_moments_lanes size)
 {
     uint64_t bits[8], most = 0;
@@ -871,27 +872,27 @@ static double gaussian_moments_remaining(double size, double bend, double bound)
 }
 
 /* The table of a stage, with its matrices or with those of the last pass. */
-static void gaussian_moments_update(gaussian_moments_lanes coef[restrict], gaussian_moments_lines *line, int matrices)
+static void gaussian_moments_update(gaussian_moments_lanes coef[restrict], gaussian_moments_model *model, int matrices)
 {
     if (matrices)
-        gaussian_moments_tabulate(coef, line);
+        gaussian_moments_tabulate(coef, model);
     else
-        gaussian_moments_evaluate_lanes(coef, line->y, line->displacement, line->increment);
+        gaussian_moments_evaluate_lanes(coef, model->y, model->displacement, model->increment);
 }
 
-/* The steps of a block one after the other, each along the lines of its lane. As X, the state with its carry, gains
+/* The steps of a block one after the other, each along the linear model of its lane. As X, the state with its carry, gains
    increment - gain residual, the next residual follows from this one; X itself is added up apart. */
-static void gaussian_moments_chain(gaussian_moments_lines line[1], double x[3], double carry[3])
+static void gaussian_moments_chain(gaussian_moments_model model[1], double x[3], double carry[3])
 {
     double residual[3], sum[3], small[3];
     for (int i = 0; i < 3; ++i) {
-        residual[i] = ((line->y[i][0] - x[i]) + line->displacement[i][0]) - carry[i];
+        residual[i] = ((model->y[i][0] - x[i]) + model->displacement[i][0]) - carry[i];
         sum[i] = x[i];
         small[i] = carry[i];
     }
     for (int k = 0; k < 1 * gaussian_moments_LANES; ++k) {
         const int lane = k / 1, after = (k + 1) / 1 % gaussian_moments_LANES;
-        gaussian_moments_lines *at = &line[k % 1], *next = &line[(k + 1) % 1];
+        gaussian_moments_model *at = &model[k % 1], *next = &model[(k + 1) % 1];
         double even[3] = { 0.0 }, odd[3] = { 0.0 }; /* two sums, so that no long chain of additions is waited for */
         for (int i = 0; i < 3; ++i) {
             at->residual[i][lane] = residual[i];
@@ -913,8 +914,8 @@ static void gaussian_moments_chain(gaussian_moments_lines line[1], double x[3], 
     }
 }
 
-/* Bring the table up to date. */
-static void gaussian_moments_tell(const gaussian_moments_solver *s, gaussian_moments_table *table)
+/* Bring the table up to date: coefficients, and weights that were fitted since. */
+static void gaussian_moments_refresh(const gaussian_moments_solver *s, gaussian_moments_table *table)
 {
     for (int stage = 0; stage < 1; ++stage) {
         if (table->fits[stage] == s->memory[stage].fits) continue;
@@ -945,7 +946,7 @@ static void gaussian_moments_foresee(const gaussian_moments_memory *memory, gaus
 
 /* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
    method, to leading order. */
-static void gaussian_moments_march(const gaussian_moments_solver *s, gaussian_moments_table *table, gaussian_moments_lines line[1])
+static void gaussian_moments_march(const gaussian_moments_solver *s, gaussian_moments_table *table, gaussian_moments_model model[1])
 {
     static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
     double x[3], point[3], slope[3], mean[3];
@@ -962,12 +963,12 @@ static void gaussian_moments_march(const gaussian_moments_solver *s, gaussian_mo
             }
         }
         for (int i = 0; i < 3; ++i) {
-            line[k % 1].y[i][k / 1] = x[i] + 0.5 * h * mean[i];
+            model[k % 1].y[i][k / 1] = x[i] + 0.5 * h * mean[i];
             x[i] += h * mean[i];
         }
     }
     for (int stage = 0; stage < 1; ++stage) {
-        gaussian_moments_lines *at = &line[stage];
+        gaussian_moments_model *at = &model[stage];
         gaussian_moments_evaluate_lanes(table->coef[stage], at->y, at->displacement, at->increment);
         for (int i = 0; i < 3; ++i) {
             gaussian_moments_EACH_LANE
@@ -981,24 +982,24 @@ static void gaussian_moments_march(const gaussian_moments_solver *s, gaussian_mo
    small as after a single step. How many passes that took; 0, and the solver as before, where it takes more than most. */
 static int gaussian_moments_block(gaussian_moments_solver *s, gaussian_moments_table *table, int most)
 {
-    gaussian_moments_lines line[1];
+    gaussian_moments_model model[1];
     gaussian_moments_lanes sizes;
     double x[3], carry[3], value[3], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
-    if (!s->foreseeing) gaussian_moments_march(s, table, line);
+    if (!s->foreseeing) gaussian_moments_march(s, table, model);
     for (int stage = 0; stage < 1; ++stage) {
-        if (s->foreseeing) gaussian_moments_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
-        if (!gaussian_moments_near_lanes(line[stage].y, s->x)) return 0;
+        if (s->foreseeing) gaussian_moments_foresee(&s->memory[stage], table->weight[stage], model[stage].y);
+        if (!gaussian_moments_near_lanes(model[stage].y, s->x)) return 0;
     }
     while (!solved) {
         double size = 0.0;
         const int matrices = previous > 1e-05;
-        for (int stage = 0; stage < 1; ++stage) gaussian_moments_update(table->coef[stage], &line[stage], matrices);
+        for (int stage = 0; stage < 1; ++stage) gaussian_moments_update(table->coef[stage], &model[stage], matrices);
         memcpy(x, s->x, sizeof x);
         memcpy(carry, s->carry, sizeof carry);
-        gaussian_moments_chain(line, x, carry);
+        gaussian_moments_chain(model, x, carry);
         for (int stage = 0; stage < 1; ++stage) {
-            gaussian_moments_correct(&line[stage], sizes);
+            gaussian_moments_correct(&model[stage], sizes);
             const double largest = gaussian_moments_largest(sizes);
             size = largest > size ? largest : size;
         }
@@ -1018,7 +1019,7 @@ static int gaussian_moments_block(gaussian_moments_solver *s, gaussian_moments_t
     for (int stage = 0; stage < 1; ++stage) {
         gaussian_moments_memory *memory = &s->memory[stage];
         for (int lane = 0; lane < gaussian_moments_LANES; ++lane) {
-            for (int i = 0; i < 3; ++i) value[i] = line[stage].y[i][lane];
+            for (int i = 0; i < 3; ++i) value[i] = model[stage].y[i][lane];
             gaussian_moments_record(memory, value);
         }
         memory->slow = passes > 1 ? memory->slow + gaussian_moments_LANES : 0;
@@ -1080,7 +1081,7 @@ gaussian_moments_status gaussian_moments_integrate(gaussian_moments_solver *s, d
     while (status == gaussian_moments_OK && steps > 0) {
         if (steps >= gaussian_moments_LANES && s->pause == 0) gaussian_moments_choose_guess(s, steps);
         if (steps >= gaussian_moments_LANES && s->pause == 0) {
-            gaussian_moments_tell(s, &table);
+            gaussian_moments_refresh(s, &table);
             const int passes = gaussian_moments_block(s, &table, (int)(2 * s->effort + 0.5));
             gaussian_moments_learn_from(s, passes);
             if (passes > 0) steps -= gaussian_moments_LANES;
@@ -1240,24 +1241,24 @@ static void gaussian_moments_group_predict(gaussian_moments_group *group, int st
 
 /* Newton's method for a stage, until the slowest lane is solved. The number of iterations; where that is the most
    allowed, lanes that are not solved leave the group. */
-static int gaussian_moments_group_solve(gaussian_moments_group *group, int stage, gaussian_moments_lines *line)
+static int gaussian_moments_group_solve(gaussian_moments_group *group, int stage, gaussian_moments_model *model)
 {
     gaussian_moments_lanes size, previous, bound;
     double largest = HUGE_VAL, bend = 0.0;
     int iterations = 0, open = 1;
     for (int lane = 0; lane < gaussian_moments_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
-    gaussian_moments_group_predict(group, stage, line->y);
+    gaussian_moments_group_predict(group, stage, model->y);
     for (; open > 0 && iterations < 20; ++iterations) {
         memcpy(previous, size, sizeof size);
-        gaussian_moments_update(group->coef[stage], line, largest > 1e-05);
+        gaussian_moments_update(group->coef[stage], model, largest > 1e-05);
         bend = largest > 1e-05 ? 0.0 : bend + largest;
         for (int i = 0; i < 3; ++i) {
             gaussian_moments_EACH_LANE
             for (int lane = 0; lane < gaussian_moments_LANES; ++lane)
-                line->residual[i][lane] =
-                    ((line->y[i][lane] - group->x[i][lane]) + line->displacement[i][lane]) - group->carry[i][lane];
+                model->residual[i][lane] =
+                    ((model->y[i][lane] - group->x[i][lane]) + model->displacement[i][lane]) - group->carry[i][lane];
         }
-        gaussian_moments_correct(line, size);
+        gaussian_moments_correct(model, size);
         open = gaussian_moments_group_open(group, size, previous, bend, bound);
         largest = gaussian_moments_largest(size);
     }
@@ -1268,18 +1269,18 @@ static int gaussian_moments_group_solve(gaussian_moments_group *group, int stage
 
 /* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
 static void gaussian_moments_group_advance(gaussian_moments_lanes x[restrict 3], gaussian_moments_lanes carry[restrict 3],
-    gaussian_moments_lines *line)
+    gaussian_moments_model *model)
 {
     for (int i = 0; i < 3; ++i)
         for (int j = 0; j < 3; ++j) {
             gaussian_moments_EACH_LANE
             for (int lane = 0; lane < gaussian_moments_LANES; ++lane)
-                carry[i][lane] -= line->gain[i * 3 + j][lane] * line->residual[j][lane];
+                carry[i][lane] -= model->gain[i * 3 + j][lane] * model->residual[j][lane];
         }
     for (int i = 0; i < 3; ++i) {
         gaussian_moments_EACH_LANE
         for (int lane = 0; lane < gaussian_moments_LANES; ++lane) {
-            const double change = line->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
+            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
             const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
             x[i][lane] = sum + small;
             carry[i][lane] = small - (x[i][lane] - sum);
@@ -1291,17 +1292,17 @@ static void gaussian_moments_group_advance(gaussian_moments_lanes x[restrict 3],
 static int gaussian_moments_group_step(gaussian_moments_group *group, size_t remaining)
 {
     gaussian_moments_lanes x[3], carry[3];
-    gaussian_moments_lines line;
+    gaussian_moments_model model;
     const int next = (group->latest + 96 - 1) % 96;
     int active = 0, most = 0;
     memcpy(x, group->x, sizeof x);
     memcpy(carry, group->carry, sizeof carry);
     for (int stage = 0; stage < 1; ++stage) {
-        const int iterations = gaussian_moments_group_solve(group, stage, &line);
-        gaussian_moments_group_advance(group->x, group->carry, &line);
-        if (next % 8 == 0 || group->count < 8) gaussian_moments_group_judge(group, stage, line.y);
+        const int iterations = gaussian_moments_group_solve(group, stage, &model);
+        gaussian_moments_group_advance(group->x, group->carry, &model);
+        if (next % 8 == 0 || group->count < 8) gaussian_moments_group_judge(group, stage, model.y);
         if (iterations > most) most = iterations;
-        memcpy(group->past[stage][next], line.y, sizeof line.y);
+        memcpy(group->past[stage][next], model.y, sizeof model.y);
     }
     group->latest = next;
     if (group->count < 96) ++group->count;
@@ -1399,6 +1400,10 @@ gaussian_moments_status gaussian_moments_ensemble(const gaussian_moments_params 
     }
     return worst;
 }
+
+#if defined(__clang__)
+#pragma clang diagnostic pop
+#endif
 
 /* the Hamiltonian */
 static void gaussian_moments_energy(const gaussian_moments_params *params, const double x[3],

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 49b2081e02f4ab7bb9b50d206cd72624077c1e082c6a84e913fac8d854b66477
+ * body-sha256: c510ecfe056a77a26c1b5600c4222f370e3b7d6cfa80b100959be244c99f66d9
  */
 #ifndef GAUSSIAN_MOMENTS_H
 #define GAUSSIAN_MOMENTS_H
@@ -72,7 +72,7 @@ typedef struct {
     int pause;      /* steps to make singly before a block is tried */
     int setback;    /* the last pause, halved with every block that succeeds */
     int foreseeing; /* whether blocks are guessed by recurrences */
-    int passes;     /* that the last block took which was not */
+    int passes;     /* that the last block took which was guessed by Runge-Kutta steps */
     size_t doubt;   /* steps to wait before recurrences are tried again */
     size_t retry;   /* steps after which that is */
     double coef[1][14]; /* what depends on params and h only, for each stage */

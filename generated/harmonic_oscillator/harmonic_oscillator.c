@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 297f92496f7fb35ecece9cb56ef1b99219fe63a128a2d0c2b3e69afa3a614278
+ * body-sha256: d59ff947738bf42fcce5c87ba7bea48fd7b72ebcc735f71c56d0cf10a712d124
  */
 #include "harmonic_oscillator.h"
 
@@ -393,6 +393,7 @@ typedef double harmonic_oscillator_lanes[harmonic_oscillator_LANES];
 
 #if defined(__clang__)
 #define harmonic_oscillator_EACH_LANE _Pragma("clang loop vectorize(assume_safety)")
+#pragma clang diagnostic push
 #pragma clang diagnostic ignored "-Wpass-failed"
 #elif defined(__GNUC__)
 #define harmonic_oscillator_EACH_LANE _Pragma("GCC ivdep") _Pragma("GCC unroll 1")
@@ -406,12 +407,12 @@ typedef struct {
     harmonic_oscillator_lanes coef[1][5], weight[1][32][2];
 } harmonic_oscillator_table;
 
-/* A stage in all lanes, linear around y: a residual r of alpha(y) = x takes inverse r from y and gain r from the
+/* A stage in all lanes, linearised around y: a residual r of alpha(y) = x takes inverse r from y and gain r from the
    increment. */
 typedef struct {
     harmonic_oscillator_lanes y[2], displacement[2], increment[2], residual[2];
     harmonic_oscillator_lanes inverse[4], slope[4], gain[4];
-} harmonic_oscillator_lines;
+} harmonic_oscillator_model;
 
 /* harmonic_oscillator_linearise in all lanes. */
 static void harmonic_oscillator_linearise_lanes(harmonic_oscillator_lanes coef[restrict 5],
@@ -490,15 +491,15 @@ static void harmonic_oscillator_invert_lanes(harmonic_oscillator_lanes matrix[re
 }
 
 /* Everything about a stage at the points y. The matrices are I + O(h): where a pivot is far from 1, all is infinite. */
-static void harmonic_oscillator_tabulate(harmonic_oscillator_lanes coef[restrict], harmonic_oscillator_lines *line)
+static void harmonic_oscillator_tabulate(harmonic_oscillator_lanes coef[restrict], harmonic_oscillator_model *model)
 {
     harmonic_oscillator_lanes jacobian[4], reciprocal[2];
-    harmonic_oscillator_linearise_lanes(coef, line->y, line->displacement, line->increment, jacobian, line->slope);
-    harmonic_oscillator_invert_lanes(jacobian, line->slope, line->inverse, line->gain, reciprocal);
+    harmonic_oscillator_linearise_lanes(coef, model->y, model->displacement, model->increment, jacobian, model->slope);
+    harmonic_oscillator_invert_lanes(jacobian, model->slope, model->inverse, model->gain, reciprocal);
     for (int i = 0; i < 2; ++i) {
         harmonic_oscillator_EACH_LANE
         for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane)
-            line->inverse[i][lane] += fabs(reciprocal[i][lane]) < 1e3 ? 0.0 : HUGE_VAL;
+            model->inverse[i][lane] += fabs(reciprocal[i][lane]) < 1e3 ? 0.0 : HUGE_VAL;
     }
 }
 
@@ -519,7 +520,7 @@ static void harmonic_oscillator_sizes(harmonic_oscillator_lanes y[restrict 2], h
 }
 
 /* Correct y by the residuals, with the inverse in the table, and measure the corrections. */
-static void harmonic_oscillator_correct(harmonic_oscillator_lines *line, harmonic_oscillator_lanes size)
+static void harmonic_oscillator_correct(harmonic_oscillator_model *model, harmonic_oscillator_lanes size)
 {
     harmonic_oscillator_lanes delta[2];
     memset(delta, 0, sizeof delta);
@@ -527,15 +528,15 @@ static void harmonic_oscillator_correct(harmonic_oscillator_lines *line, harmoni
         for (int j = 0; j < 2; ++j) {
             harmonic_oscillator_EACH_LANE
             for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane)
-                delta[i][lane] += line->inverse[i * 2 + j][lane] * line->residual[j][lane];
+                delta[i][lane] += model->inverse[i * 2 + j][lane] * model->residual[j][lane];
         }
-    harmonic_oscillator_sizes(line->y, delta, size);
+    harmonic_oscillator_sizes(model->y, delta, size);
     for (int i = 0; i < 2; ++i)
-        for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane) line->y[i][lane] -= delta[i][lane];
+        for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane) model->y[i][lane] -= delta[i][lane];
 }
 
-/* The largest of the lanes, which are not negative; infinite if one is not finite. As integers, the bits of numbers that are not negative have their
-   order, and those of what is no number are larger. */
+/* The largest of the lanes, none of which is negative; infinite if one is not finite. As integers, the bits of such
+   numbers have their order, and those of what is no number are larger. */
 static double harmonic_oscillator_largest(const harmonic_oscillator_lanes size)
 {
     uint64_t bits[8], most = 0;
@@ -568,27 +569,27 @@ static double harmonic_oscillator_remaining(double size, double bend, double bou
 }
 
 /* The table of a stage, with its matrices or with those of the last pass. */
-static void harmonic_oscillator_update(harmonic_oscillator_lanes coef[restrict], harmonic_oscillator_lines *line, int matrices)
+static void harmonic_oscillator_update(harmonic_oscillator_lanes coef[restrict], harmonic_oscillator_model *model, int matrices)
 {
     if (matrices)
-        harmonic_oscillator_tabulate(coef, line);
+        harmonic_oscillator_tabulate(coef, model);
     else
-        harmonic_oscillator_evaluate_lanes(coef, line->y, line->displacement, line->increment);
+        harmonic_oscillator_evaluate_lanes(coef, model->y, model->displacement, model->increment);
 }
 
-/* The steps of a block one after the other, each along the lines of its lane. As X, the state with its carry, gains
+/* The steps of a block one after the other, each along the linear model of its lane. As X, the state with its carry, gains
    increment - gain residual, the next residual follows from this one; X itself is added up apart. */
-static void harmonic_oscillator_chain(harmonic_oscillator_lines line[1], double x[2], double carry[2])
+static void harmonic_oscillator_chain(harmonic_oscillator_model model[1], double x[2], double carry[2])
 {
     double residual[2], sum[2], small[2];
     for (int i = 0; i < 2; ++i) {
-        residual[i] = ((line->y[i][0] - x[i]) + line->displacement[i][0]) - carry[i];
+        residual[i] = ((model->y[i][0] - x[i]) + model->displacement[i][0]) - carry[i];
         sum[i] = x[i];
         small[i] = carry[i];
     }
     for (int k = 0; k < 1 * harmonic_oscillator_LANES; ++k) {
         const int lane = k / 1, after = (k + 1) / 1 % harmonic_oscillator_LANES;
-        harmonic_oscillator_lines *at = &line[k % 1], *next = &line[(k + 1) % 1];
+        harmonic_oscillator_model *at = &model[k % 1], *next = &model[(k + 1) % 1];
         double even[2] = { 0.0 }, odd[2] = { 0.0 }; /* two sums, so that no long chain of additions is waited for */
         for (int i = 0; i < 2; ++i) {
             at->residual[i][lane] = residual[i];
@@ -610,8 +611,8 @@ static void harmonic_oscillator_chain(harmonic_oscillator_lines line[1], double 
     }
 }
 
-/* Bring the table up to date. */
-static void harmonic_oscillator_tell(const harmonic_oscillator_solver *s, harmonic_oscillator_table *table)
+/* Bring the table up to date: coefficients, and weights that were fitted since. */
+static void harmonic_oscillator_refresh(const harmonic_oscillator_solver *s, harmonic_oscillator_table *table)
 {
     for (int stage = 0; stage < 1; ++stage) {
         if (table->fits[stage] == s->memory[stage].fits) continue;
@@ -642,7 +643,7 @@ static void harmonic_oscillator_foresee(const harmonic_oscillator_memory *memory
 
 /* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
    method, to leading order. */
-static void harmonic_oscillator_march(const harmonic_oscillator_solver *s, harmonic_oscillator_table *table, harmonic_oscillator_lines line[1])
+static void harmonic_oscillator_march(const harmonic_oscillator_solver *s, harmonic_oscillator_table *table, harmonic_oscillator_model model[1])
 {
     static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
     double x[2], point[2], slope[2], mean[2];
@@ -659,12 +660,12 @@ static void harmonic_oscillator_march(const harmonic_oscillator_solver *s, harmo
             }
         }
         for (int i = 0; i < 2; ++i) {
-            line[k % 1].y[i][k / 1] = x[i] + 0.5 * h * mean[i];
+            model[k % 1].y[i][k / 1] = x[i] + 0.5 * h * mean[i];
             x[i] += h * mean[i];
         }
     }
     for (int stage = 0; stage < 1; ++stage) {
-        harmonic_oscillator_lines *at = &line[stage];
+        harmonic_oscillator_model *at = &model[stage];
         harmonic_oscillator_evaluate_lanes(table->coef[stage], at->y, at->displacement, at->increment);
         for (int i = 0; i < 2; ++i) {
             harmonic_oscillator_EACH_LANE
@@ -678,24 +679,24 @@ static void harmonic_oscillator_march(const harmonic_oscillator_solver *s, harmo
    small as after a single step. How many passes that took; 0, and the solver as before, where it takes more than most. */
 static int harmonic_oscillator_block(harmonic_oscillator_solver *s, harmonic_oscillator_table *table, int most)
 {
-    harmonic_oscillator_lines line[1];
+    harmonic_oscillator_model model[1];
     harmonic_oscillator_lanes sizes;
     double x[2], carry[2], value[2], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
-    if (!s->foreseeing) harmonic_oscillator_march(s, table, line);
+    if (!s->foreseeing) harmonic_oscillator_march(s, table, model);
     for (int stage = 0; stage < 1; ++stage) {
-        if (s->foreseeing) harmonic_oscillator_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
-        if (!harmonic_oscillator_near_lanes(line[stage].y, s->x)) return 0;
+        if (s->foreseeing) harmonic_oscillator_foresee(&s->memory[stage], table->weight[stage], model[stage].y);
+        if (!harmonic_oscillator_near_lanes(model[stage].y, s->x)) return 0;
     }
     while (!solved) {
         double size = 0.0;
         const int matrices = previous > 1e-05;
-        for (int stage = 0; stage < 1; ++stage) harmonic_oscillator_update(table->coef[stage], &line[stage], matrices);
+        for (int stage = 0; stage < 1; ++stage) harmonic_oscillator_update(table->coef[stage], &model[stage], matrices);
         memcpy(x, s->x, sizeof x);
         memcpy(carry, s->carry, sizeof carry);
-        harmonic_oscillator_chain(line, x, carry);
+        harmonic_oscillator_chain(model, x, carry);
         for (int stage = 0; stage < 1; ++stage) {
-            harmonic_oscillator_correct(&line[stage], sizes);
+            harmonic_oscillator_correct(&model[stage], sizes);
             const double largest = harmonic_oscillator_largest(sizes);
             size = largest > size ? largest : size;
         }
@@ -715,7 +716,7 @@ static int harmonic_oscillator_block(harmonic_oscillator_solver *s, harmonic_osc
     for (int stage = 0; stage < 1; ++stage) {
         harmonic_oscillator_memory *memory = &s->memory[stage];
         for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane) {
-            for (int i = 0; i < 2; ++i) value[i] = line[stage].y[i][lane];
+            for (int i = 0; i < 2; ++i) value[i] = model[stage].y[i][lane];
             harmonic_oscillator_record(memory, value);
         }
         memory->slow = passes > 1 ? memory->slow + harmonic_oscillator_LANES : 0;
@@ -777,7 +778,7 @@ harmonic_oscillator_status harmonic_oscillator_integrate(harmonic_oscillator_sol
     while (status == harmonic_oscillator_OK && steps > 0) {
         if (steps >= harmonic_oscillator_LANES && s->pause == 0) harmonic_oscillator_choose_guess(s, steps);
         if (steps >= harmonic_oscillator_LANES && s->pause == 0) {
-            harmonic_oscillator_tell(s, &table);
+            harmonic_oscillator_refresh(s, &table);
             const int passes = harmonic_oscillator_block(s, &table, (int)(2 * s->effort + 0.5));
             harmonic_oscillator_learn_from(s, passes);
             if (passes > 0) steps -= harmonic_oscillator_LANES;
@@ -937,24 +938,24 @@ static void harmonic_oscillator_group_predict(harmonic_oscillator_group *group, 
 
 /* Newton's method for a stage, until the slowest lane is solved. The number of iterations; where that is the most
    allowed, lanes that are not solved leave the group. */
-static int harmonic_oscillator_group_solve(harmonic_oscillator_group *group, int stage, harmonic_oscillator_lines *line)
+static int harmonic_oscillator_group_solve(harmonic_oscillator_group *group, int stage, harmonic_oscillator_model *model)
 {
     harmonic_oscillator_lanes size, previous, bound;
     double largest = HUGE_VAL, bend = 0.0;
     int iterations = 0, open = 1;
     for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
-    harmonic_oscillator_group_predict(group, stage, line->y);
+    harmonic_oscillator_group_predict(group, stage, model->y);
     for (; open > 0 && iterations < 20; ++iterations) {
         memcpy(previous, size, sizeof size);
-        harmonic_oscillator_update(group->coef[stage], line, largest > 1e-05);
+        harmonic_oscillator_update(group->coef[stage], model, largest > 1e-05);
         bend = largest > 1e-05 ? 0.0 : bend + largest;
         for (int i = 0; i < 2; ++i) {
             harmonic_oscillator_EACH_LANE
             for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane)
-                line->residual[i][lane] =
-                    ((line->y[i][lane] - group->x[i][lane]) + line->displacement[i][lane]) - group->carry[i][lane];
+                model->residual[i][lane] =
+                    ((model->y[i][lane] - group->x[i][lane]) + model->displacement[i][lane]) - group->carry[i][lane];
         }
-        harmonic_oscillator_correct(line, size);
+        harmonic_oscillator_correct(model, size);
         open = harmonic_oscillator_group_open(group, size, previous, bend, bound);
         largest = harmonic_oscillator_largest(size);
     }
@@ -965,18 +966,18 @@ static int harmonic_oscillator_group_solve(harmonic_oscillator_group *group, int
 
 /* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
 static void harmonic_oscillator_group_advance(harmonic_oscillator_lanes x[restrict 2], harmonic_oscillator_lanes carry[restrict 2],
-    harmonic_oscillator_lines *line)
+    harmonic_oscillator_model *model)
 {
     for (int i = 0; i < 2; ++i)
         for (int j = 0; j < 2; ++j) {
             harmonic_oscillator_EACH_LANE
             for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane)
-                carry[i][lane] -= line->gain[i * 2 + j][lane] * line->residual[j][lane];
+                carry[i][lane] -= model->gain[i * 2 + j][lane] * model->residual[j][lane];
         }
     for (int i = 0; i < 2; ++i) {
         harmonic_oscillator_EACH_LANE
         for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane) {
-            const double change = line->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
+            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
             const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
             x[i][lane] = sum + small;
             carry[i][lane] = small - (x[i][lane] - sum);
@@ -988,17 +989,17 @@ static void harmonic_oscillator_group_advance(harmonic_oscillator_lanes x[restri
 static int harmonic_oscillator_group_step(harmonic_oscillator_group *group, size_t remaining)
 {
     harmonic_oscillator_lanes x[2], carry[2];
-    harmonic_oscillator_lines line;
+    harmonic_oscillator_model model;
     const int next = (group->latest + 96 - 1) % 96;
     int active = 0, most = 0;
     memcpy(x, group->x, sizeof x);
     memcpy(carry, group->carry, sizeof carry);
     for (int stage = 0; stage < 1; ++stage) {
-        const int iterations = harmonic_oscillator_group_solve(group, stage, &line);
-        harmonic_oscillator_group_advance(group->x, group->carry, &line);
-        if (next % 8 == 0 || group->count < 8) harmonic_oscillator_group_judge(group, stage, line.y);
+        const int iterations = harmonic_oscillator_group_solve(group, stage, &model);
+        harmonic_oscillator_group_advance(group->x, group->carry, &model);
+        if (next % 8 == 0 || group->count < 8) harmonic_oscillator_group_judge(group, stage, model.y);
         if (iterations > most) most = iterations;
-        memcpy(group->past[stage][next], line.y, sizeof line.y);
+        memcpy(group->past[stage][next], model.y, sizeof model.y);
     }
     group->latest = next;
     if (group->count < 96) ++group->count;
@@ -1096,6 +1097,10 @@ harmonic_oscillator_status harmonic_oscillator_ensemble(const harmonic_oscillato
     }
     return worst;
 }
+
+#if defined(__clang__)
+#pragma clang diagnostic pop
+#endif
 
 /* the Hamiltonian */
 static void harmonic_oscillator_energy(const harmonic_oscillator_params *params, const double x[2],

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: e6abf9e2344e16a41339e597b88a5f765971ebd0bb6ce554e2d4bba98e8974e9
+ * body-sha256: 1bd76a7bd8c250c20123111beb7f18ba1e9f889186eb00c16f0e3d91be7b25d3
  */
 #ifndef HARMONIC_OSCILLATOR_H
 #define HARMONIC_OSCILLATOR_H
@@ -72,7 +72,7 @@ typedef struct {
     int pause;      /* steps to make singly before a block is tried */
     int setback;    /* the last pause, halved with every block that succeeds */
     int foreseeing; /* whether blocks are guessed by recurrences */
-    int passes;     /* that the last block took which was not */
+    int passes;     /* that the last block took which was guessed by Runge-Kutta steps */
     size_t doubt;   /* steps to wait before recurrences are tried again */
     size_t retry;   /* steps after which that is */
     double coef[1][5]; /* what depends on params and h only, for each stage */

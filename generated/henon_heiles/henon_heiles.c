@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 87d6fd6535241b1d00e58f98f8f36d9cb926807e104b7a7c051b1c73efee6c20
+ * body-sha256: c604aeb17a44b4e22402bf1cb8dc87b0d03b8825c9a5b1d943f37b66c8a6e2c0
  */
 #include "henon_heiles.h"
 
@@ -496,6 +496,7 @@ typedef double henon_heiles_lanes[henon_heiles_LANES];
 
 #if defined(__clang__)
 #define henon_heiles_EACH_LANE _Pragma("clang loop vectorize(assume_safety)")
+#pragma clang diagnostic push
 #pragma clang diagnostic ignored "-Wpass-failed"
 #elif defined(__GNUC__)
 #define henon_heiles_EACH_LANE _Pragma("GCC ivdep") _Pragma("GCC unroll 1")
@@ -509,12 +510,12 @@ typedef struct {
     henon_heiles_lanes coef[1][24], weight[1][32][4];
 } henon_heiles_table;
 
-/* A stage in all lanes, linear around y: a residual r of alpha(y) = x takes inverse r from y and gain r from the
+/* A stage in all lanes, linearised around y: a residual r of alpha(y) = x takes inverse r from y and gain r from the
    increment. */
 typedef struct {
     henon_heiles_lanes y[4], displacement[4], increment[4], residual[4];
     henon_heiles_lanes inverse[16], slope[16], gain[16];
-} henon_heiles_lines;
+} henon_heiles_model;
 
 /* henon_heiles_linearise in all lanes. */
 static void henon_heiles_linearise_lanes(henon_heiles_lanes coef[restrict 24],
@@ -722,15 +723,15 @@ static void henon_heiles_invert_lanes(henon_heiles_lanes matrix[restrict 16],
 }
 
 /* Everything about a stage at the points y. The matrices are I + O(h): where a pivot is far from 1, all is infinite. */
-static void henon_heiles_tabulate(henon_heiles_lanes coef[restrict], henon_heiles_lines *line)
+static void henon_heiles_tabulate(henon_heiles_lanes coef[restrict], henon_heiles_model *model)
 {
     henon_heiles_lanes jacobian[16], reciprocal[4];
-    henon_heiles_linearise_lanes(coef, line->y, line->displacement, line->increment, jacobian, line->slope);
-    henon_heiles_invert_lanes(jacobian, line->slope, line->inverse, line->gain, reciprocal);
+    henon_heiles_linearise_lanes(coef, model->y, model->displacement, model->increment, jacobian, model->slope);
+    henon_heiles_invert_lanes(jacobian, model->slope, model->inverse, model->gain, reciprocal);
     for (int i = 0; i < 4; ++i) {
         henon_heiles_EACH_LANE
         for (int lane = 0; lane < henon_heiles_LANES; ++lane)
-            line->inverse[i][lane] += fabs(reciprocal[i][lane]) < 1e3 ? 0.0 : HUGE_VAL;
+            model->inverse[i][lane] += fabs(reciprocal[i][lane]) < 1e3 ? 0.0 : HUGE_VAL;
     }
 }
 
@@ -751,7 +752,7 @@ static void henon_heiles_sizes(henon_heiles_lanes y[restrict 4], henon_heiles_la
 }
 
 /* Correct y by the residuals, with the inverse in the table, and measure the corrections. */
-static void henon_heiles_correct(henon_heiles_lines *line, henon_heiles_lanes size)
+static void henon_heiles_correct(henon_heiles_model *model, henon_heiles_lanes size)
 {
     henon_heiles_lanes delta[4];
     memset(delta, 0, sizeof delta);
@@ -759,15 +760,15 @@ static void henon_heiles_correct(henon_heiles_lines *line, henon_heiles_lanes si
         for (int j = 0; j < 4; ++j) {
             henon_heiles_EACH_LANE
             for (int lane = 0; lane < henon_heiles_LANES; ++lane)
-                delta[i][lane] += line->inverse[i * 4 + j][lane] * line->residual[j][lane];
+                delta[i][lane] += model->inverse[i * 4 + j][lane] * model->residual[j][lane];
         }
-    henon_heiles_sizes(line->y, delta, size);
+    henon_heiles_sizes(model->y, delta, size);
     for (int i = 0; i < 4; ++i)
-        for (int lane = 0; lane < henon_heiles_LANES; ++lane) line->y[i][lane] -= delta[i][lane];
+        for (int lane = 0; lane < henon_heiles_LANES; ++lane) model->y[i][lane] -= delta[i][lane];
 }
 
-/* The largest of the lanes, which are not negative; infinite if one is not finite. As integers, the bits of numbers that are not negative have their
-   order, and those of what is no number are larger. */
+/* The largest of the lanes, none of which is negative; infinite if one is not finite. As integers, the bits of such
+   numbers have their order, and those of what is no number are larger. */
 static double henon_heiles_largest(const henon_heiles_lanes size)
 {
     uint64_t bits[8], most = 0;
@@ -800,27 +801,27 @@ static double henon_heiles_remaining(double size, double bend, double bound)
 }
 
 /* The table of a stage, with its matrices or with those of the last pass. */
-static void henon_heiles_update(henon_heiles_lanes coef[restrict], henon_heiles_lines *line, int matrices)
+static void henon_heiles_update(henon_heiles_lanes coef[restrict], henon_heiles_model *model, int matrices)
 {
     if (matrices)
-        henon_heiles_tabulate(coef, line);
+        henon_heiles_tabulate(coef, model);
     else
-        henon_heiles_evaluate_lanes(coef, line->y, line->displacement, line->increment);
+        henon_heiles_evaluate_lanes(coef, model->y, model->displacement, model->increment);
 }
 
-/* The steps of a block one after the other, each along the lines of its lane. As X, the state with its carry, gains
+/* The steps of a block one after the other, each along the linear model of its lane. As X, the state with its carry, gains
    increment - gain residual, the next residual follows from this one; X itself is added up apart. */
-static void henon_heiles_chain(henon_heiles_lines line[1], double x[4], double carry[4])
+static void henon_heiles_chain(henon_heiles_model model[1], double x[4], double carry[4])
 {
     double residual[4], sum[4], small[4];
     for (int i = 0; i < 4; ++i) {
-        residual[i] = ((line->y[i][0] - x[i]) + line->displacement[i][0]) - carry[i];
+        residual[i] = ((model->y[i][0] - x[i]) + model->displacement[i][0]) - carry[i];
         sum[i] = x[i];
         small[i] = carry[i];
     }
     for (int k = 0; k < 1 * henon_heiles_LANES; ++k) {
         const int lane = k / 1, after = (k + 1) / 1 % henon_heiles_LANES;
-        henon_heiles_lines *at = &line[k % 1], *next = &line[(k + 1) % 1];
+        henon_heiles_model *at = &model[k % 1], *next = &model[(k + 1) % 1];
         double even[4] = { 0.0 }, odd[4] = { 0.0 }; /* two sums, so that no long chain of additions is waited for */
         for (int i = 0; i < 4; ++i) {
             at->residual[i][lane] = residual[i];
@@ -842,8 +843,8 @@ static void henon_heiles_chain(henon_heiles_lines line[1], double x[4], double c
     }
 }
 
-/* Bring the table up to date. */
-static void henon_heiles_tell(const henon_heiles_solver *s, henon_heiles_table *table)
+/* Bring the table up to date: coefficients, and weights that were fitted since. */
+static void henon_heiles_refresh(const henon_heiles_solver *s, henon_heiles_table *table)
 {
     for (int stage = 0; stage < 1; ++stage) {
         if (table->fits[stage] == s->memory[stage].fits) continue;
@@ -874,7 +875,7 @@ static void henon_heiles_foresee(const henon_heiles_memory *memory, henon_heiles
 
 /* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
    method, to leading order. */
-static void henon_heiles_march(const henon_heiles_solver *s, henon_heiles_table *table, henon_heiles_lines line[1])
+static void henon_heiles_march(const henon_heiles_solver *s, henon_heiles_table *table, henon_heiles_model model[1])
 {
     static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
     double x[4], point[4], slope[4], mean[4];
@@ -891,12 +892,12 @@ static void henon_heiles_march(const henon_heiles_solver *s, henon_heiles_table 
             }
         }
         for (int i = 0; i < 4; ++i) {
-            line[k % 1].y[i][k / 1] = x[i] + 0.5 * h * mean[i];
+            model[k % 1].y[i][k / 1] = x[i] + 0.5 * h * mean[i];
             x[i] += h * mean[i];
         }
     }
     for (int stage = 0; stage < 1; ++stage) {
-        henon_heiles_lines *at = &line[stage];
+        henon_heiles_model *at = &model[stage];
         henon_heiles_evaluate_lanes(table->coef[stage], at->y, at->displacement, at->increment);
         for (int i = 0; i < 4; ++i) {
             henon_heiles_EACH_LANE
@@ -910,24 +911,24 @@ static void henon_heiles_march(const henon_heiles_solver *s, henon_heiles_table 
    small as after a single step. How many passes that took; 0, and the solver as before, where it takes more than most. */
 static int henon_heiles_block(henon_heiles_solver *s, henon_heiles_table *table, int most)
 {
-    henon_heiles_lines line[1];
+    henon_heiles_model model[1];
     henon_heiles_lanes sizes;
     double x[4], carry[4], value[4], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
-    if (!s->foreseeing) henon_heiles_march(s, table, line);
+    if (!s->foreseeing) henon_heiles_march(s, table, model);
     for (int stage = 0; stage < 1; ++stage) {
-        if (s->foreseeing) henon_heiles_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
-        if (!henon_heiles_near_lanes(line[stage].y, s->x)) return 0;
+        if (s->foreseeing) henon_heiles_foresee(&s->memory[stage], table->weight[stage], model[stage].y);
+        if (!henon_heiles_near_lanes(model[stage].y, s->x)) return 0;
     }
     while (!solved) {
         double size = 0.0;
         const int matrices = previous > 1e-05;
-        for (int stage = 0; stage < 1; ++stage) henon_heiles_update(table->coef[stage], &line[stage], matrices);
+        for (int stage = 0; stage < 1; ++stage) henon_heiles_update(table->coef[stage], &model[stage], matrices);
         memcpy(x, s->x, sizeof x);
         memcpy(carry, s->carry, sizeof carry);
-        henon_heiles_chain(line, x, carry);
+        henon_heiles_chain(model, x, carry);
         for (int stage = 0; stage < 1; ++stage) {
-            henon_heiles_correct(&line[stage], sizes);
+            henon_heiles_correct(&model[stage], sizes);
             const double largest = henon_heiles_largest(sizes);
             size = largest > size ? largest : size;
         }
@@ -947,7 +948,7 @@ static int henon_heiles_block(henon_heiles_solver *s, henon_heiles_table *table,
     for (int stage = 0; stage < 1; ++stage) {
         henon_heiles_memory *memory = &s->memory[stage];
         for (int lane = 0; lane < henon_heiles_LANES; ++lane) {
-            for (int i = 0; i < 4; ++i) value[i] = line[stage].y[i][lane];
+            for (int i = 0; i < 4; ++i) value[i] = model[stage].y[i][lane];
             henon_heiles_record(memory, value);
         }
         memory->slow = passes > 1 ? memory->slow + henon_heiles_LANES : 0;
@@ -1009,7 +1010,7 @@ henon_heiles_status henon_heiles_integrate(henon_heiles_solver *s, double h, siz
     while (status == henon_heiles_OK && steps > 0) {
         if (steps >= henon_heiles_LANES && s->pause == 0) henon_heiles_choose_guess(s, steps);
         if (steps >= henon_heiles_LANES && s->pause == 0) {
-            henon_heiles_tell(s, &table);
+            henon_heiles_refresh(s, &table);
             const int passes = henon_heiles_block(s, &table, (int)(2 * s->effort + 0.5));
             henon_heiles_learn_from(s, passes);
             if (passes > 0) steps -= henon_heiles_LANES;
@@ -1169,24 +1170,24 @@ static void henon_heiles_group_predict(henon_heiles_group *group, int stage, hen
 
 /* Newton's method for a stage, until the slowest lane is solved. The number of iterations; where that is the most
    allowed, lanes that are not solved leave the group. */
-static int henon_heiles_group_solve(henon_heiles_group *group, int stage, henon_heiles_lines *line)
+static int henon_heiles_group_solve(henon_heiles_group *group, int stage, henon_heiles_model *model)
 {
     henon_heiles_lanes size, previous, bound;
     double largest = HUGE_VAL, bend = 0.0;
     int iterations = 0, open = 1;
     for (int lane = 0; lane < henon_heiles_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
-    henon_heiles_group_predict(group, stage, line->y);
+    henon_heiles_group_predict(group, stage, model->y);
     for (; open > 0 && iterations < 20; ++iterations) {
         memcpy(previous, size, sizeof size);
-        henon_heiles_update(group->coef[stage], line, largest > 1e-05);
+        henon_heiles_update(group->coef[stage], model, largest > 1e-05);
         bend = largest > 1e-05 ? 0.0 : bend + largest;
         for (int i = 0; i < 4; ++i) {
             henon_heiles_EACH_LANE
             for (int lane = 0; lane < henon_heiles_LANES; ++lane)
-                line->residual[i][lane] =
-                    ((line->y[i][lane] - group->x[i][lane]) + line->displacement[i][lane]) - group->carry[i][lane];
+                model->residual[i][lane] =
+                    ((model->y[i][lane] - group->x[i][lane]) + model->displacement[i][lane]) - group->carry[i][lane];
         }
-        henon_heiles_correct(line, size);
+        henon_heiles_correct(model, size);
         open = henon_heiles_group_open(group, size, previous, bend, bound);
         largest = henon_heiles_largest(size);
     }
@@ -1197,18 +1198,18 @@ static int henon_heiles_group_solve(henon_heiles_group *group, int stage, henon_
 
 /* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
 static void henon_heiles_group_advance(henon_heiles_lanes x[restrict 4], henon_heiles_lanes carry[restrict 4],
-    henon_heiles_lines *line)
+    henon_heiles_model *model)
 {
     for (int i = 0; i < 4; ++i)
         for (int j = 0; j < 4; ++j) {
             henon_heiles_EACH_LANE
             for (int lane = 0; lane < henon_heiles_LANES; ++lane)
-                carry[i][lane] -= line->gain[i * 4 + j][lane] * line->residual[j][lane];
+                carry[i][lane] -= model->gain[i * 4 + j][lane] * model->residual[j][lane];
         }
     for (int i = 0; i < 4; ++i) {
         henon_heiles_EACH_LANE
         for (int lane = 0; lane < henon_heiles_LANES; ++lane) {
-            const double change = line->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
+            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
             const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
             x[i][lane] = sum + small;
             carry[i][lane] = small - (x[i][lane] - sum);
@@ -1220,17 +1221,17 @@ static void henon_heiles_group_advance(henon_heiles_lanes x[restrict 4], henon_h
 static int henon_heiles_group_step(henon_heiles_group *group, size_t remaining)
 {
     henon_heiles_lanes x[4], carry[4];
-    henon_heiles_lines line;
+    henon_heiles_model model;
     const int next = (group->latest + 96 - 1) % 96;
     int active = 0, most = 0;
     memcpy(x, group->x, sizeof x);
     memcpy(carry, group->carry, sizeof carry);
     for (int stage = 0; stage < 1; ++stage) {
-        const int iterations = henon_heiles_group_solve(group, stage, &line);
-        henon_heiles_group_advance(group->x, group->carry, &line);
-        if (next % 8 == 0 || group->count < 8) henon_heiles_group_judge(group, stage, line.y);
+        const int iterations = henon_heiles_group_solve(group, stage, &model);
+        henon_heiles_group_advance(group->x, group->carry, &model);
+        if (next % 8 == 0 || group->count < 8) henon_heiles_group_judge(group, stage, model.y);
         if (iterations > most) most = iterations;
-        memcpy(group->past[stage][next], line.y, sizeof line.y);
+        memcpy(group->past[stage][next], model.y, sizeof model.y);
     }
     group->latest = next;
     if (group->count < 96) ++group->count;
@@ -1327,6 +1328,10 @@ henon_heiles_status henon_heiles_ensemble(const henon_heiles_params *params, dou
     }
     return worst;
 }
+
+#if defined(__clang__)
+#pragma clang diagnostic pop
+#endif
 
 /* the Hamiltonian */
 static void henon_heiles_energy(const henon_heiles_params *params, const double x[4],

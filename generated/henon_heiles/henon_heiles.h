@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 4351986fc29016ed0b5cfbc3edf60105aa11d69639ecac7c27866659f09e4f0a
+ * body-sha256: ec66a2a80cbc7f8afab07e12f9d7a2303b2503f9fdd182a7a367942ce4ba7484
  */
 #ifndef HENON_HEILES_H
 #define HENON_HEILES_H
@@ -71,7 +71,7 @@ typedef struct {
     int pause;      /* steps to make singly before a block is tried */
     int setback;    /* the last pause, halved with every block that succeeds */
     int foreseeing; /* whether blocks are guessed by recurrences */
-    int passes;     /* that the last block took which was not */
+    int passes;     /* that the last block took which was guessed by Runge-Kutta steps */
     size_t doubt;   /* steps to wait before recurrences are tried again */
     size_t retry;   /* steps after which that is */
     double coef[1][24]; /* what depends on params and h only, for each stage */

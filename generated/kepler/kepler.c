@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 9248d0352c0f320a89e45bf7b11310c31a99518183ab777247ba7e06a6a88364
+ * body-sha256: 64e039643266a85e8740ba255e13d69dd122594ed78a4ab2ad50698302cf1b4a
  */
 #include "kepler.h"
 
@@ -806,6 +806,7 @@ typedef double kepler_lanes[kepler_LANES];
 
 #if defined(__clang__)
 #define kepler_EACH_LANE _Pragma("clang loop vectorize(assume_safety)")
+#pragma clang diagnostic push
 #pragma clang diagnostic ignored "-Wpass-failed"
 #elif defined(__GNUC__)
 #define kepler_EACH_LANE _Pragma("GCC ivdep") _Pragma("GCC unroll 1")
@@ -819,12 +820,12 @@ typedef struct {
     kepler_lanes coef[1][118], weight[1][32][4];
 } kepler_table;
 
-/* A stage in all lanes, linear around y: a residual r of alpha(y) = x takes inverse r from y and gain r from the
+/* A stage in all lanes, linearised around y: a residual r of alpha(y) = x takes inverse r from y and gain r from the
    increment. */
 typedef struct {
     kepler_lanes y[4], displacement[4], increment[4], residual[4];
     kepler_lanes inverse[16], slope[16], gain[16];
-} kepler_lines;
+} kepler_model;
 
 /* kepler_linearise_lanes_part1 (part 1 of 2) */
 kepler_APART static void kepler_linearise_lanes_part1(kepler_lanes coef[restrict 118],
@@ -1244,15 +1245,15 @@ static void kepler_invert_lanes(kepler_lanes matrix[restrict 16], kepler_lanes s
 }
 
 /* Everything about a stage at the points y. The matrices are I + O(h): where a pivot is far from 1, all is infinite. */
-static void kepler_tabulate(kepler_lanes coef[restrict], kepler_lines *line)
+static void kepler_tabulate(kepler_lanes coef[restrict], kepler_model *model)
 {
     kepler_lanes jacobian[16], reciprocal[4];
-    kepler_linearise_lanes(coef, line->y, line->displacement, line->increment, jacobian, line->slope);
-    kepler_invert_lanes(jacobian, line->slope, line->inverse, line->gain, reciprocal);
+    kepler_linearise_lanes(coef, model->y, model->displacement, model->increment, jacobian, model->slope);
+    kepler_invert_lanes(jacobian, model->slope, model->inverse, model->gain, reciprocal);
     for (int i = 0; i < 4; ++i) {
         kepler_EACH_LANE
         for (int lane = 0; lane < kepler_LANES; ++lane)
-            line->inverse[i][lane] += fabs(reciprocal[i][lane]) < 1e3 ? 0.0 : HUGE_VAL;
+            model->inverse[i][lane] += fabs(reciprocal[i][lane]) < 1e3 ? 0.0 : HUGE_VAL;
     }
 }
 
@@ -1273,7 +1274,7 @@ static void kepler_sizes(kepler_lanes y[restrict 4], kepler_lanes delta[restrict
 }
 
 /* Correct y by the residuals, with the inverse in the table, and measure the corrections. */
-static void kepler_correct(kepler_lines *line, kepler_lanes size)
+static void kepler_correct(kepler_model *model, kepler_lanes size)
 {
     kepler_lanes delta[4];
     memset(delta, 0, sizeof delta);
@@ -1281,15 +1282,15 @@ static void kepler_correct(kepler_lines *line, kepler_lanes size)
         for (int j = 0; j < 4; ++j) {
             kepler_EACH_LANE
             for (int lane = 0; lane < kepler_LANES; ++lane)
-                delta[i][lane] += line->inverse[i * 4 + j][lane] * line->residual[j][lane];
+                delta[i][lane] += model->inverse[i * 4 + j][lane] * model->residual[j][lane];
         }
-    kepler_sizes(line->y, delta, size);
+    kepler_sizes(model->y, delta, size);
     for (int i = 0; i < 4; ++i)
-        for (int lane = 0; lane < kepler_LANES; ++lane) line->y[i][lane] -= delta[i][lane];
+        for (int lane = 0; lane < kepler_LANES; ++lane) model->y[i][lane] -= delta[i][lane];
 }
 
-/* The largest of the lanes, which are not negative; infinite if one is not finite. As integers, the bits of numbers that are not negative have their
-   order, and those of what is no number are larger. */
+/* The largest of the lanes, none of which is negative; infinite if one is not finite. As integers, the bits of such
+   numbers have their order, and those of what is no number are larger. */
 static double kepler_largest(const kepler_lanes size)
 {
     uint64_t bits[8], most = 0;
@@ -1322,27 +1323,27 @@ static double kepler_remaining(double size, double bend, double bound)
 }
 
 /* The table of a stage, with its matrices or with those of the last pass. */
-static void kepler_update(kepler_lanes coef[restrict], kepler_lines *line, int matrices)
+static void kepler_update(kepler_lanes coef[restrict], kepler_model *model, int matrices)
 {
     if (matrices)
-        kepler_tabulate(coef, line);
+        kepler_tabulate(coef, model);
     else
-        kepler_evaluate_lanes(coef, line->y, line->displacement, line->increment);
+        kepler_evaluate_lanes(coef, model->y, model->displacement, model->increment);
 }
 
-/* The steps of a block one after the other, each along the lines of its lane. As X, the state with its carry, gains
+/* The steps of a block one after the other, each along the linear model of its lane. As X, the state with its carry, gains
    increment - gain residual, the next residual follows from this one; X itself is added up apart. */
-static void kepler_chain(kepler_lines line[1], double x[4], double carry[4])
+static void kepler_chain(kepler_model model[1], double x[4], double carry[4])
 {
     double residual[4], sum[4], small[4];
     for (int i = 0; i < 4; ++i) {
-        residual[i] = ((line->y[i][0] - x[i]) + line->displacement[i][0]) - carry[i];
+        residual[i] = ((model->y[i][0] - x[i]) + model->displacement[i][0]) - carry[i];
         sum[i] = x[i];
         small[i] = carry[i];
     }
     for (int k = 0; k < 1 * kepler_LANES; ++k) {
         const int lane = k / 1, after = (k + 1) / 1 % kepler_LANES;
-        kepler_lines *at = &line[k % 1], *next = &line[(k + 1) % 1];
+        kepler_model *at = &model[k % 1], *next = &model[(k + 1) % 1];
         double even[4] = { 0.0 }, odd[4] = { 0.0 }; /* two sums, so that no long chain of additions is waited for */
         for (int i = 0; i < 4; ++i) {
             at->residual[i][lane] = residual[i];
@@ -1364,8 +1365,8 @@ static void kepler_chain(kepler_lines line[1], double x[4], double carry[4])
     }
 }
 
-/* Bring the table up to date. */
-static void kepler_tell(const kepler_solver *s, kepler_table *table)
+/* Bring the table up to date: coefficients, and weights that were fitted since. */
+static void kepler_refresh(const kepler_solver *s, kepler_table *table)
 {
     for (int stage = 0; stage < 1; ++stage) {
         if (table->fits[stage] == s->memory[stage].fits) continue;
@@ -1396,7 +1397,7 @@ static void kepler_foresee(const kepler_memory *memory, kepler_lanes weight[rest
 
 /* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
    method, to leading order. */
-static void kepler_march(const kepler_solver *s, kepler_table *table, kepler_lines line[1])
+static void kepler_march(const kepler_solver *s, kepler_table *table, kepler_model model[1])
 {
     static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
     double x[4], point[4], slope[4], mean[4];
@@ -1413,12 +1414,12 @@ static void kepler_march(const kepler_solver *s, kepler_table *table, kepler_lin
             }
         }
         for (int i = 0; i < 4; ++i) {
-            line[k % 1].y[i][k / 1] = x[i] + 0.5 * h * mean[i];
+            model[k % 1].y[i][k / 1] = x[i] + 0.5 * h * mean[i];
             x[i] += h * mean[i];
         }
     }
     for (int stage = 0; stage < 1; ++stage) {
-        kepler_lines *at = &line[stage];
+        kepler_model *at = &model[stage];
         kepler_evaluate_lanes(table->coef[stage], at->y, at->displacement, at->increment);
         for (int i = 0; i < 4; ++i) {
             kepler_EACH_LANE
@@ -1432,24 +1433,24 @@ static void kepler_march(const kepler_solver *s, kepler_table *table, kepler_lin
    small as after a single step. How many passes that took; 0, and the solver as before, where it takes more than most. */
 static int kepler_block(kepler_solver *s, kepler_table *table, int most)
 {
-    kepler_lines line[1];
+    kepler_model model[1];
     kepler_lanes sizes;
     double x[4], carry[4], value[4], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
-    if (!s->foreseeing) kepler_march(s, table, line);
+    if (!s->foreseeing) kepler_march(s, table, model);
     for (int stage = 0; stage < 1; ++stage) {
-        if (s->foreseeing) kepler_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
-        if (!kepler_near_lanes(line[stage].y, s->x)) return 0;
+        if (s->foreseeing) kepler_foresee(&s->memory[stage], table->weight[stage], model[stage].y);
+        if (!kepler_near_lanes(model[stage].y, s->x)) return 0;
     }
     while (!solved) {
         double size = 0.0;
         const int matrices = previous > 1e-05;
-        for (int stage = 0; stage < 1; ++stage) kepler_update(table->coef[stage], &line[stage], matrices);
+        for (int stage = 0; stage < 1; ++stage) kepler_update(table->coef[stage], &model[stage], matrices);
         memcpy(x, s->x, sizeof x);
         memcpy(carry, s->carry, sizeof carry);
-        kepler_chain(line, x, carry);
+        kepler_chain(model, x, carry);
         for (int stage = 0; stage < 1; ++stage) {
-            kepler_correct(&line[stage], sizes);
+            kepler_correct(&model[stage], sizes);
             const double largest = kepler_largest(sizes);
             size = largest > size ? largest : size;
         }
@@ -1469,7 +1470,7 @@ static int kepler_block(kepler_solver *s, kepler_table *table, int most)
     for (int stage = 0; stage < 1; ++stage) {
         kepler_memory *memory = &s->memory[stage];
         for (int lane = 0; lane < kepler_LANES; ++lane) {
-            for (int i = 0; i < 4; ++i) value[i] = line[stage].y[i][lane];
+            for (int i = 0; i < 4; ++i) value[i] = model[stage].y[i][lane];
             kepler_record(memory, value);
         }
         memory->slow = passes > 1 ? memory->slow + kepler_LANES : 0;
@@ -1531,7 +1532,7 @@ kepler_status kepler_integrate(kepler_solver *s, double h, size_t steps)
     while (status == kepler_OK && steps > 0) {
         if (steps >= kepler_LANES && s->pause == 0) kepler_choose_guess(s, steps);
         if (steps >= kepler_LANES && s->pause == 0) {
-            kepler_tell(s, &table);
+            kepler_refresh(s, &table);
             const int passes = kepler_block(s, &table, (int)(2 * s->effort + 0.5));
             kepler_learn_from(s, passes);
             if (passes > 0) steps -= kepler_LANES;
@@ -1691,24 +1692,24 @@ static void kepler_group_predict(kepler_group *group, int stage, kepler_lanes y[
 
 /* Newton's method for a stage, until the slowest lane is solved. The number of iterations; where that is the most
    allowed, lanes that are not solved leave the group. */
-static int kepler_group_solve(kepler_group *group, int stage, kepler_lines *line)
+static int kepler_group_solve(kepler_group *group, int stage, kepler_model *model)
 {
     kepler_lanes size, previous, bound;
     double largest = HUGE_VAL, bend = 0.0;
     int iterations = 0, open = 1;
     for (int lane = 0; lane < kepler_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
-    kepler_group_predict(group, stage, line->y);
+    kepler_group_predict(group, stage, model->y);
     for (; open > 0 && iterations < 20; ++iterations) {
         memcpy(previous, size, sizeof size);
-        kepler_update(group->coef[stage], line, largest > 1e-05);
+        kepler_update(group->coef[stage], model, largest > 1e-05);
         bend = largest > 1e-05 ? 0.0 : bend + largest;
         for (int i = 0; i < 4; ++i) {
             kepler_EACH_LANE
             for (int lane = 0; lane < kepler_LANES; ++lane)
-                line->residual[i][lane] =
-                    ((line->y[i][lane] - group->x[i][lane]) + line->displacement[i][lane]) - group->carry[i][lane];
+                model->residual[i][lane] =
+                    ((model->y[i][lane] - group->x[i][lane]) + model->displacement[i][lane]) - group->carry[i][lane];
         }
-        kepler_correct(line, size);
+        kepler_correct(model, size);
         open = kepler_group_open(group, size, previous, bend, bound);
         largest = kepler_largest(size);
     }
@@ -1719,18 +1720,18 @@ static int kepler_group_solve(kepler_group *group, int stage, kepler_lines *line
 
 /* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
 static void kepler_group_advance(kepler_lanes x[restrict 4], kepler_lanes carry[restrict 4],
-    kepler_lines *line)
+    kepler_model *model)
 {
     for (int i = 0; i < 4; ++i)
         for (int j = 0; j < 4; ++j) {
             kepler_EACH_LANE
             for (int lane = 0; lane < kepler_LANES; ++lane)
-                carry[i][lane] -= line->gain[i * 4 + j][lane] * line->residual[j][lane];
+                carry[i][lane] -= model->gain[i * 4 + j][lane] * model->residual[j][lane];
         }
     for (int i = 0; i < 4; ++i) {
         kepler_EACH_LANE
         for (int lane = 0; lane < kepler_LANES; ++lane) {
-            const double change = line->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
+            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
             const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
             x[i][lane] = sum + small;
             carry[i][lane] = small - (x[i][lane] - sum);
@@ -1742,17 +1743,17 @@ static void kepler_group_advance(kepler_lanes x[restrict 4], kepler_lanes carry[
 static int kepler_group_step(kepler_group *group, size_t remaining)
 {
     kepler_lanes x[4], carry[4];
-    kepler_lines line;
+    kepler_model model;
     const int next = (group->latest + 96 - 1) % 96;
     int active = 0, most = 0;
     memcpy(x, group->x, sizeof x);
     memcpy(carry, group->carry, sizeof carry);
     for (int stage = 0; stage < 1; ++stage) {
-        const int iterations = kepler_group_solve(group, stage, &line);
-        kepler_group_advance(group->x, group->carry, &line);
-        if (next % 8 == 0 || group->count < 8) kepler_group_judge(group, stage, line.y);
+        const int iterations = kepler_group_solve(group, stage, &model);
+        kepler_group_advance(group->x, group->carry, &model);
+        if (next % 8 == 0 || group->count < 8) kepler_group_judge(group, stage, model.y);
         if (iterations > most) most = iterations;
-        memcpy(group->past[stage][next], line.y, sizeof line.y);
+        memcpy(group->past[stage][next], model.y, sizeof model.y);
     }
     group->latest = next;
     if (group->count < 96) ++group->count;
@@ -1849,6 +1850,10 @@ kepler_status kepler_ensemble(const kepler_params *params, double *x, size_t mem
     }
     return worst;
 }
+
+#if defined(__clang__)
+#pragma clang diagnostic pop
+#endif
 
 /* the Hamiltonian */
 static void kepler_energy(const kepler_params *params, const double x[4], double energy[restrict 1])

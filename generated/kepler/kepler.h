@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 87d9da918aea1119785d85d0c2074fc511b9b9c1195a26fc902b2c4d3f6fee79
+ * body-sha256: 21a305079987374a9de07f4bfeb5d5df6345fee49152d5cfd7fac0d3577fe8ce
  */
 #ifndef KEPLER_H
 #define KEPLER_H
@@ -71,7 +71,7 @@ typedef struct {
     int pause;      /* steps to make singly before a block is tried */
     int setback;    /* the last pause, halved with every block that succeeds */
     int foreseeing; /* whether blocks are guessed by recurrences */
-    int passes;     /* that the last block took which was not */
+    int passes;     /* that the last block took which was guessed by Runge-Kutta steps */
     size_t doubt;   /* steps to wait before recurrences are tried again */
     size_t retry;   /* steps after which that is */
     double coef[1][118]; /* what depends on params and h only, for each stage */

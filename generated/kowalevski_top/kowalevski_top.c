@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 802b9c0fb74a6a531084851bdaf9b85744bd220b38cdb9320f88d752bed54b17
+ * body-sha256: b0588e1b52f617b07b655d4c6bdb55b6fc7d19bba0bd2ef9a96b7102ad25ea6c
  */
 #include "kowalevski_top.h"
 
@@ -1320,6 +1320,7 @@ typedef double kowalevski_top_lanes[kowalevski_top_LANES];
 
 #if defined(__clang__)
 #define kowalevski_top_EACH_LANE _Pragma("clang loop vectorize(assume_safety)")
+#pragma clang diagnostic push
 #pragma clang diagnostic ignored "-Wpass-failed"
 #elif defined(__GNUC__)
 #define kowalevski_top_EACH_LANE _Pragma("GCC ivdep") _Pragma("GCC unroll 1")
@@ -1333,12 +1334,12 @@ typedef struct {
     kowalevski_top_lanes coef[1][172], weight[1][32][6];
 } kowalevski_top_table;
 
-/* A stage in all lanes, linear around y: a residual r of alpha(y) = x takes inverse r from y and gain r from the
+/* A stage in all lanes, linearised around y: a residual r of alpha(y) = x takes inverse r from y and gain r from the
    increment. */
 typedef struct {
     kowalevski_top_lanes y[6], displacement[6], increment[6], residual[6];
     kowalevski_top_lanes inverse[36], slope[36], gain[36];
-} kowalevski_top_lines;
+} kowalevski_top_model;
 
 /* kowalevski_top_phi0 for the loops over lanes: no branches. Infinite beyond |s| = 4.0. */
 static inline double kowalevski_top_phi0_lane(double s)
@@ -2244,19 +2245,19 @@ static void kowalevski_top_invert(kowalevski_top_lanes matrix[restrict 36])
 }
 
 /* Everything about a stage at the points y. */
-static void kowalevski_top_tabulate(kowalevski_top_lanes coef[restrict], kowalevski_top_lines *line)
+static void kowalevski_top_tabulate(kowalevski_top_lanes coef[restrict], kowalevski_top_model *model)
 {
-    kowalevski_top_linearise_lanes(coef, line->y, line->displacement, line->increment, line->inverse, line->slope);
-    kowalevski_top_invert(line->inverse);
+    kowalevski_top_linearise_lanes(coef, model->y, model->displacement, model->increment, model->inverse, model->slope);
+    kowalevski_top_invert(model->inverse);
     for (int i = 0; i < 6; ++i)
         for (int j = 0; j < 6; ++j) {
             kowalevski_top_lanes sum = { 0.0 };
             for (int k = 0; k < 6; ++k) {
                 kowalevski_top_EACH_LANE
                 for (int lane = 0; lane < kowalevski_top_LANES; ++lane)
-                    sum[lane] += line->slope[i * 6 + k][lane] * line->inverse[k * 6 + j][lane];
+                    sum[lane] += model->slope[i * 6 + k][lane] * model->inverse[k * 6 + j][lane];
             }
-            memcpy(line->gain[i * 6 + j], sum, sizeof sum);
+            memcpy(model->gain[i * 6 + j], sum, sizeof sum);
         }
 }
 
@@ -2277,7 +2278,7 @@ static void kowalevski_top_sizes(kowalevski_top_lanes y[restrict 6], kowalevski_
 }
 
 /* Correct y by the residuals, with the inverse in the table, and measure the corrections. */
-static void kowalevski_top_correct(kowalevski_top_lines *line, kowalevski_top_lanes size)
+static void kowalevski_top_correct(kowalevski_top_model *model, kowalevski_top_lanes size)
 {
     kowalevski_top_lanes delta[6];
     memset(delta, 0, sizeof delta);
@@ -2285,15 +2286,15 @@ static void kowalevski_top_correct(kowalevski_top_lines *line, kowalevski_top_la
         for (int j = 0; j < 6; ++j) {
             kowalevski_top_EACH_LANE
             for (int lane = 0; lane < kowalevski_top_LANES; ++lane)
-                delta[i][lane] += line->inverse[i * 6 + j][lane] * line->residual[j][lane];
+                delta[i][lane] += model->inverse[i * 6 + j][lane] * model->residual[j][lane];
         }
-    kowalevski_top_sizes(line->y, delta, size);
+    kowalevski_top_sizes(model->y, delta, size);
     for (int i = 0; i < 6; ++i)
-        for (int lane = 0; lane < kowalevski_top_LANES; ++lane) line->y[i][lane] -= delta[i][lane];
+        for (int lane = 0; lane < kowalevski_top_LANES; ++lane) model->y[i][lane] -= delta[i][lane];
 }
 
-/* The largest of the lanes, which are not negative; infinite if one is not finite. As integers, the bits of numbers that are not negative have their
-   order, and those of what is no number are larger. */
+/* The largest of the lanes, none of which is negative; infinite if one is not finite. As integers, the bits of such
+   numbers have their order, and those of what is no number are larger. */
 static double kowalevski_top_largest(const kowalevski_top_lanes size)
 {
     uint64_t bits[8], most = 0;
@@ -2326,27 +2327,27 @@ static double kowalevski_top_remaining(double size, double bend, double bound)
 }
 
 /* The table of a stage, with its matrices or with those of the last pass. */
-static void kowalevski_top_update(kowalevski_top_lanes coef[restrict], kowalevski_top_lines *line, int matrices)
+static void kowalevski_top_update(kowalevski_top_lanes coef[restrict], kowalevski_top_model *model, int matrices)
 {
     if (matrices)
-        kowalevski_top_tabulate(coef, line);
+        kowalevski_top_tabulate(coef, model);
     else
-        kowalevski_top_evaluate_lanes(coef, line->y, line->displacement, line->increment);
+        kowalevski_top_evaluate_lanes(coef, model->y, model->displacement, model->increment);
 }
 
-/* The steps of a block one after the other, each along the lines of its lane. As X, the state with its carry, gains
+/* The steps of a block one after the other, each along the linear model of its lane. As X, the state with its carry, gains
    increment - gain residual, the next residual follows from this one; X itself is added up apart. */
-static void kowalevski_top_chain(kowalevski_top_lines line[1], double x[6], double carry[6])
+static void kowalevski_top_chain(kowalevski_top_model model[1], double x[6], double carry[6])
 {
     double residual[6], sum[6], small[6];
     for (int i = 0; i < 6; ++i) {
-        residual[i] = ((line->y[i][0] - x[i]) + line->displacement[i][0]) - carry[i];
+        residual[i] = ((model->y[i][0] - x[i]) + model->displacement[i][0]) - carry[i];
         sum[i] = x[i];
         small[i] = carry[i];
     }
     for (int k = 0; k < 1 * kowalevski_top_LANES; ++k) {
         const int lane = k / 1, after = (k + 1) / 1 % kowalevski_top_LANES;
-        kowalevski_top_lines *at = &line[k % 1], *next = &line[(k + 1) % 1];
+        kowalevski_top_model *at = &model[k % 1], *next = &model[(k + 1) % 1];
         double even[6] = { 0.0 }, odd[6] = { 0.0 }; /* two sums, so that no long chain of additions is waited for */
         for (int i = 0; i < 6; ++i) {
             at->residual[i][lane] = residual[i];
@@ -2368,8 +2369,8 @@ static void kowalevski_top_chain(kowalevski_top_lines line[1], double x[6], doub
     }
 }
 
-/* Bring the table up to date. */
-static void kowalevski_top_tell(const kowalevski_top_solver *s, kowalevski_top_table *table)
+/* Bring the table up to date: coefficients, and weights that were fitted since. */
+static void kowalevski_top_refresh(const kowalevski_top_solver *s, kowalevski_top_table *table)
 {
     for (int stage = 0; stage < 1; ++stage) {
         if (table->fits[stage] == s->memory[stage].fits) continue;
@@ -2400,7 +2401,7 @@ static void kowalevski_top_foresee(const kowalevski_top_memory *memory, kowalevs
 
 /* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
    method, to leading order. */
-static void kowalevski_top_march(const kowalevski_top_solver *s, kowalevski_top_table *table, kowalevski_top_lines line[1])
+static void kowalevski_top_march(const kowalevski_top_solver *s, kowalevski_top_table *table, kowalevski_top_model model[1])
 {
     static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
     double x[6], point[6], slope[6], mean[6];
@@ -2417,12 +2418,12 @@ static void kowalevski_top_march(const kowalevski_top_solver *s, kowalevski_top_
             }
         }
         for (int i = 0; i < 6; ++i) {
-            line[k % 1].y[i][k / 1] = x[i] + 0.5 * h * mean[i];
+            model[k % 1].y[i][k / 1] = x[i] + 0.5 * h * mean[i];
             x[i] += h * mean[i];
         }
     }
     for (int stage = 0; stage < 1; ++stage) {
-        kowalevski_top_lines *at = &line[stage];
+        kowalevski_top_model *at = &model[stage];
         kowalevski_top_evaluate_lanes(table->coef[stage], at->y, at->displacement, at->increment);
         for (int i = 0; i < 6; ++i) {
             kowalevski_top_EACH_LANE
@@ -2436,24 +2437,24 @@ static void kowalevski_top_march(const kowalevski_top_solver *s, kowalevski_top_
    small as after a single step. How many passes that took; 0, and the solver as before, where it takes more than most. */
 static int kowalevski_top_block(kowalevski_top_solver *s, kowalevski_top_table *table, int most)
 {
-    kowalevski_top_lines line[1];
+    kowalevski_top_model model[1];
     kowalevski_top_lanes sizes;
     double x[6], carry[6], value[6], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
-    if (!s->foreseeing) kowalevski_top_march(s, table, line);
+    if (!s->foreseeing) kowalevski_top_march(s, table, model);
     for (int stage = 0; stage < 1; ++stage) {
-        if (s->foreseeing) kowalevski_top_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
-        if (!kowalevski_top_near_lanes(line[stage].y, s->x)) return 0;
+        if (s->foreseeing) kowalevski_top_foresee(&s->memory[stage], table->weight[stage], model[stage].y);
+        if (!kowalevski_top_near_lanes(model[stage].y, s->x)) return 0;
     }
     while (!solved) {
         double size = 0.0;
         const int matrices = previous > 1e-05;
-        for (int stage = 0; stage < 1; ++stage) kowalevski_top_update(table->coef[stage], &line[stage], matrices);
+        for (int stage = 0; stage < 1; ++stage) kowalevski_top_update(table->coef[stage], &model[stage], matrices);
         memcpy(x, s->x, sizeof x);
         memcpy(carry, s->carry, sizeof carry);
-        kowalevski_top_chain(line, x, carry);
+        kowalevski_top_chain(model, x, carry);
         for (int stage = 0; stage < 1; ++stage) {
-            kowalevski_top_correct(&line[stage], sizes);
+            kowalevski_top_correct(&model[stage], sizes);
             const double largest = kowalevski_top_largest(sizes);
             size = largest > size ? largest : size;
         }
@@ -2473,7 +2474,7 @@ static int kowalevski_top_block(kowalevski_top_solver *s, kowalevski_top_table *
     for (int stage = 0; stage < 1; ++stage) {
         kowalevski_top_memory *memory = &s->memory[stage];
         for (int lane = 0; lane < kowalevski_top_LANES; ++lane) {
-            for (int i = 0; i < 6; ++i) value[i] = line[stage].y[i][lane];
+            for (int i = 0; i < 6; ++i) value[i] = model[stage].y[i][lane];
             kowalevski_top_record(memory, value);
         }
         memory->slow = passes > 1 ? memory->slow + kowalevski_top_LANES : 0;
@@ -2535,7 +2536,7 @@ kowalevski_top_status kowalevski_top_integrate(kowalevski_top_solver *s, double 
     while (status == kowalevski_top_OK && steps > 0) {
         if (steps >= kowalevski_top_LANES && s->pause == 0) kowalevski_top_choose_guess(s, steps);
         if (steps >= kowalevski_top_LANES && s->pause == 0) {
-            kowalevski_top_tell(s, &table);
+            kowalevski_top_refresh(s, &table);
             const int passes = kowalevski_top_block(s, &table, (int)(2 * s->effort + 0.5));
             kowalevski_top_learn_from(s, passes);
             if (passes > 0) steps -= kowalevski_top_LANES;
@@ -2695,24 +2696,24 @@ static void kowalevski_top_group_predict(kowalevski_top_group *group, int stage,
 
 /* Newton's method for a stage, until the slowest lane is solved. The number of iterations; where that is the most
    allowed, lanes that are not solved leave the group. */
-static int kowalevski_top_group_solve(kowalevski_top_group *group, int stage, kowalevski_top_lines *line)
+static int kowalevski_top_group_solve(kowalevski_top_group *group, int stage, kowalevski_top_model *model)
 {
     kowalevski_top_lanes size, previous, bound;
     double largest = HUGE_VAL, bend = 0.0;
     int iterations = 0, open = 1;
     for (int lane = 0; lane < kowalevski_top_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
-    kowalevski_top_group_predict(group, stage, line->y);
+    kowalevski_top_group_predict(group, stage, model->y);
     for (; open > 0 && iterations < 20; ++iterations) {
         memcpy(previous, size, sizeof size);
-        kowalevski_top_update(group->coef[stage], line, largest > 1e-05);
+        kowalevski_top_update(group->coef[stage], model, largest > 1e-05);
         bend = largest > 1e-05 ? 0.0 : bend + largest;
         for (int i = 0; i < 6; ++i) {
             kowalevski_top_EACH_LANE
             for (int lane = 0; lane < kowalevski_top_LANES; ++lane)
-                line->residual[i][lane] =
-                    ((line->y[i][lane] - group->x[i][lane]) + line->displacement[i][lane]) - group->carry[i][lane];
+                model->residual[i][lane] =
+                    ((model->y[i][lane] - group->x[i][lane]) + model->displacement[i][lane]) - group->carry[i][lane];
         }
-        kowalevski_top_correct(line, size);
+        kowalevski_top_correct(model, size);
         open = kowalevski_top_group_open(group, size, previous, bend, bound);
         largest = kowalevski_top_largest(size);
     }
@@ -2723,18 +2724,18 @@ static int kowalevski_top_group_solve(kowalevski_top_group *group, int stage, ko
 
 /* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
 static void kowalevski_top_group_advance(kowalevski_top_lanes x[restrict 6], kowalevski_top_lanes carry[restrict 6],
-    kowalevski_top_lines *line)
+    kowalevski_top_model *model)
 {
     for (int i = 0; i < 6; ++i)
         for (int j = 0; j < 6; ++j) {
             kowalevski_top_EACH_LANE
             for (int lane = 0; lane < kowalevski_top_LANES; ++lane)
-                carry[i][lane] -= line->gain[i * 6 + j][lane] * line->residual[j][lane];
+                carry[i][lane] -= model->gain[i * 6 + j][lane] * model->residual[j][lane];
         }
     for (int i = 0; i < 6; ++i) {
         kowalevski_top_EACH_LANE
         for (int lane = 0; lane < kowalevski_top_LANES; ++lane) {
-            const double change = line->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
+            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
             const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
             x[i][lane] = sum + small;
             carry[i][lane] = small - (x[i][lane] - sum);
@@ -2746,17 +2747,17 @@ static void kowalevski_top_group_advance(kowalevski_top_lanes x[restrict 6], kow
 static int kowalevski_top_group_step(kowalevski_top_group *group, size_t remaining)
 {
     kowalevski_top_lanes x[6], carry[6];
-    kowalevski_top_lines line;
+    kowalevski_top_model model;
     const int next = (group->latest + 96 - 1) % 96;
     int active = 0, most = 0;
     memcpy(x, group->x, sizeof x);
     memcpy(carry, group->carry, sizeof carry);
     for (int stage = 0; stage < 1; ++stage) {
-        const int iterations = kowalevski_top_group_solve(group, stage, &line);
-        kowalevski_top_group_advance(group->x, group->carry, &line);
-        if (next % 8 == 0 || group->count < 8) kowalevski_top_group_judge(group, stage, line.y);
+        const int iterations = kowalevski_top_group_solve(group, stage, &model);
+        kowalevski_top_group_advance(group->x, group->carry, &model);
+        if (next % 8 == 0 || group->count < 8) kowalevski_top_group_judge(group, stage, model.y);
         if (iterations > most) most = iterations;
-        memcpy(group->past[stage][next], line.y, sizeof line.y);
+        memcpy(group->past[stage][next], model.y, sizeof model.y);
     }
     group->latest = next;
     if (group->count < 96) ++group->count;
@@ -2853,6 +2854,10 @@ kowalevski_top_status kowalevski_top_ensemble(const kowalevski_top_params *param
     }
     return worst;
 }
+
+#if defined(__clang__)
+#pragma clang diagnostic pop
+#endif
 
 /* the Hamiltonian */
 static void kowalevski_top_energy(const kowalevski_top_params *params, const double x[6],

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 85d6ab4585abc2716c1abf3cbfc0a18da23bcfa9bfdd8eab16854a75b6ac8f82
+ * body-sha256: 433da3a814e12e52ecdfedbe3d4110176faa04cdfd26c5460925ba8b959474d3
  */
 #ifndef KOWALEVSKI_TOP_H
 #define KOWALEVSKI_TOP_H
@@ -71,7 +71,7 @@ typedef struct {
     int pause;      /* steps to make singly before a block is tried */
     int setback;    /* the last pause, halved with every block that succeeds */
     int foreseeing; /* whether blocks are guessed by recurrences */
-    int passes;     /* that the last block took which was not */
+    int passes;     /* that the last block took which was guessed by Runge-Kutta steps */
     size_t doubt;   /* steps to wait before recurrences are tried again */
     size_t retry;   /* steps after which that is */
     double coef[1][172]; /* what depends on params and h only, for each stage */

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 64bb006fd010ad54414410569b71708d262388170372cbd7020c9336061b1953
+ * body-sha256: 608721bcfead459e759b2c7b91b8b36b3948ccdd8740112d8b71a72c62871838
  */
 #include "lagrange_top.h"
 
@@ -914,6 +914,7 @@ typedef double lagrange_top_lanes[lagrange_top_LANES];
 
 #if defined(__clang__)
 #define lagrange_top_EACH_LANE _Pragma("clang loop vectorize(assume_safety)")
+#pragma clang diagnostic push
 #pragma clang diagnostic ignored "-Wpass-failed"
 #elif defined(__GNUC__)
 #define lagrange_top_EACH_LANE _Pragma("GCC ivdep") _Pragma("GCC unroll 1")
@@ -927,12 +928,12 @@ typedef struct {
     lagrange_top_lanes coef[1][8], weight[1][32][6];
 } lagrange_top_table;
 
-/* A stage in all lanes, linear around y: a residual r of alpha(y) = x takes inverse r from y and gain r from the
+/* A stage in all lanes, linearised around y: a residual r of alpha(y) = x takes inverse r from y and gain r from the
    increment. */
 typedef struct {
     lagrange_top_lanes y[6], displacement[6], increment[6], residual[6];
     lagrange_top_lanes inverse[36], slope[36], gain[36];
-} lagrange_top_lines;
+} lagrange_top_model;
 
 /* lagrange_top_phi0 for the loops over lanes: no branches. Infinite beyond |s| = 4.0. */
 static inline double lagrange_top_phi0_lane(double s)
@@ -1519,19 +1520,19 @@ static void lagrange_top_invert(lagrange_top_lanes matrix[restrict 36])
 }
 
 /* Everything about a stage at the points y. */
-static void lagrange_top_tabulate(lagrange_top_lanes coef[restrict], lagrange_top_lines *line)
+static void lagrange_top_tabulate(lagrange_top_lanes coef[restrict], lagrange_top_model *model)
 {
-    lagrange_top_linearise_lanes(coef, line->y, line->displacement, line->increment, line->inverse, line->slope);
-    lagrange_top_invert(line->inverse);
+    lagrange_top_linearise_lanes(coef, model->y, model->displacement, model->increment, model->inverse, model->slope);
+    lagrange_top_invert(model->inverse);
     for (int i = 0; i < 6; ++i)
         for (int j = 0; j < 6; ++j) {
             lagrange_top_lanes sum = { 0.0 };
             for (int k = 0; k < 6; ++k) {
                 lagrange_top_EACH_LANE
                 for (int lane = 0; lane < lagrange_top_LANES; ++lane)
-                    sum[lane] += line->slope[i * 6 + k][lane] * line->inverse[k * 6 + j][lane];
+                    sum[lane] += model->slope[i * 6 + k][lane] * model->inverse[k * 6 + j][lane];
             }
-            memcpy(line->gain[i * 6 + j], sum, sizeof sum);
+            memcpy(model->gain[i * 6 + j], sum, sizeof sum);
         }
 }
 
@@ -1552,7 +1553,7 @@ static void lagrange_top_sizes(lagrange_top_lanes y[restrict 6], lagrange_top_la
 }
 
 /* Correct y by the residuals, with the inverse in the table, and measure the corrections. */
-static void lagrange_top_correct(lagrange_top_lines *line, lagrange_top_lanes size)
+static void lagrange_top_correct(lagrange_top_model *model, lagrange_top_lanes size)
 {
     lagrange_top_lanes delta[6];
     memset(delta, 0, sizeof delta);
@@ -1560,15 +1561,15 @@ static void lagrange_top_correct(lagrange_top_lines *line, lagrange_top_lanes si
         for (int j = 0; j < 6; ++j) {
             lagrange_top_EACH_LANE
             for (int lane = 0; lane < lagrange_top_LANES; ++lane)
-                delta[i][lane] += line->inverse[i * 6 + j][lane] * line->residual[j][lane];
+                delta[i][lane] += model->inverse[i * 6 + j][lane] * model->residual[j][lane];
         }
-    lagrange_top_sizes(line->y, delta, size);
+    lagrange_top_sizes(model->y, delta, size);
     for (int i = 0; i < 6; ++i)
-        for (int lane = 0; lane < lagrange_top_LANES; ++lane) line->y[i][lane] -= delta[i][lane];
+        for (int lane = 0; lane < lagrange_top_LANES; ++lane) model->y[i][lane] -= delta[i][lane];
 }
 
-/* The largest of the lanes, which are not negative; infinite if one is not finite. As integers, the bits of numbers that are not negative have their
-   order, and those of what is no number are larger. */
+/* The largest of the lanes, none of which is negative; infinite if one is not finite. As integers, the bits of such
+   numbers have their order, and those of what is no number are larger. */
 static double lagrange_top_largest(const lagrange_top_lanes size)
 {
     uint64_t bits[8], most = 0;
@@ -1601,27 +1602,27 @@ static double lagrange_top_remaining(double size, double bend, double bound)
 }
 
 /* The table of a stage, with its matrices or with those of the last pass. */
-static void lagrange_top_update(lagrange_top_lanes coef[restrict], lagrange_top_lines *line, int matrices)
+static void lagrange_top_update(lagrange_top_lanes coef[restrict], lagrange_top_model *model, int matrices)
 {
     if (matrices)
-        lagrange_top_tabulate(coef, line);
+        lagrange_top_tabulate(coef, model);
     else
-        lagrange_top_evaluate_lanes(coef, line->y, line->displacement, line->increment);
+        lagrange_top_evaluate_lanes(coef, model->y, model->displacement, model->increment);
 }
 
-/* The steps of a block one after the other, each along the lines of its lane. As X, the state with its carry, gains
+/* The steps of a block one after the other, each along the linear model of its lane. As X, the state with its carry, gains
    increment - gain residual, the next residual follows from this one; X itself is added up apart. */
-static void lagrange_top_chain(lagrange_top_lines line[1], double x[6], double carry[6])
+static void lagrange_top_chain(lagrange_top_model model[1], double x[6], double carry[6])
 {
     double residual[6], sum[6], small[6];
     for (int i = 0; i < 6; ++i) {
-        residual[i] = ((line->y[i][0] - x[i]) + line->displacement[i][0]) - carry[i];
+        residual[i] = ((model->y[i][0] - x[i]) + model->displacement[i][0]) - carry[i];
         sum[i] = x[i];
         small[i] = carry[i];
     }
     for (int k = 0; k < 1 * lagrange_top_LANES; ++k) {
         const int lane = k / 1, after = (k + 1) / 1 % lagrange_top_LANES;
-        lagrange_top_lines *at = &line[k % 1], *next = &line[(k + 1) % 1];
+        lagrange_top_model *at = &model[k % 1], *next = &model[(k + 1) % 1];
         double even[6] = { 0.0 }, odd[6] = { 0.0 }; /* two sums, so that no long chain of additions is waited for */
         for (int i = 0; i < 6; ++i) {
             at->residual[i][lane] = residual[i];
@@ -1643,8 +1644,8 @@ static void lagrange_top_chain(lagrange_top_lines line[1], double x[6], double c
     }
 }
 
-/* Bring the table up to date. */
-static void lagrange_top_tell(const lagrange_top_solver *s, lagrange_top_table *table)
+/* Bring the table up to date: coefficients, and weights that were fitted since. */
+static void lagrange_top_refresh(const lagrange_top_solver *s, lagrange_top_table *table)
 {
     for (int stage = 0; stage < 1; ++stage) {
         if (table->fits[stage] == s->memory[stage].fits) continue;
@@ -1675,7 +1676,7 @@ static void lagrange_top_foresee(const lagrange_top_memory *memory, lagrange_top
 
 /* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
    method, to leading order. */
-static void lagrange_top_march(const lagrange_top_solver *s, lagrange_top_table *table, lagrange_top_lines line[1])
+static void lagrange_top_march(const lagrange_top_solver *s, lagrange_top_table *table, lagrange_top_model model[1])
 {
     static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
     double x[6], point[6], slope[6], mean[6];
@@ -1692,12 +1693,12 @@ static void lagrange_top_march(const lagrange_top_solver *s, lagrange_top_table 
             }
         }
         for (int i = 0; i < 6; ++i) {
-            line[k % 1].y[i][k / 1] = x[i] + 0.5 * h * mean[i];
+            model[k % 1].y[i][k / 1] = x[i] + 0.5 * h * mean[i];
             x[i] += h * mean[i];
         }
     }
     for (int stage = 0; stage < 1; ++stage) {
-        lagrange_top_lines *at = &line[stage];
+        lagrange_top_model *at = &model[stage];
         lagrange_top_evaluate_lanes(table->coef[stage], at->y, at->displacement, at->increment);
         for (int i = 0; i < 6; ++i) {
             lagrange_top_EACH_LANE
@@ -1711,24 +1712,24 @@ static void lagrange_top_march(const lagrange_top_solver *s, lagrange_top_table 
    small as after a single step. How many passes that took; 0, and the solver as before, where it takes more than most. */
 static int lagrange_top_block(lagrange_top_solver *s, lagrange_top_table *table, int most)
 {
-    lagrange_top_lines line[1];
+    lagrange_top_model model[1];
     lagrange_top_lanes sizes;
     double x[6], carry[6], value[6], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
-    if (!s->foreseeing) lagrange_top_march(s, table, line);
+    if (!s->foreseeing) lagrange_top_march(s, table, model);
     for (int stage = 0; stage < 1; ++stage) {
-        if (s->foreseeing) lagrange_top_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
-        if (!lagrange_top_near_lanes(line[stage].y, s->x)) return 0;
+        if (s->foreseeing) lagrange_top_foresee(&s->memory[stage], table->weight[stage], model[stage].y);
+        if (!lagrange_top_near_lanes(model[stage].y, s->x)) return 0;
     }
     while (!solved) {
         double size = 0.0;
         const int matrices = previous > 1e-05;
-        for (int stage = 0; stage < 1; ++stage) lagrange_top_update(table->coef[stage], &line[stage], matrices);
+        for (int stage = 0; stage < 1; ++stage) lagrange_top_update(table->coef[stage], &model[stage], matrices);
         memcpy(x, s->x, sizeof x);
         memcpy(carry, s->carry, sizeof carry);
-        lagrange_top_chain(line, x, carry);
+        lagrange_top_chain(model, x, carry);
         for (int stage = 0; stage < 1; ++stage) {
-            lagrange_top_correct(&line[stage], sizes);
+            lagrange_top_correct(&model[stage], sizes);
             const double largest = lagrange_top_largest(sizes);
             size = largest > size ? largest : size;
         }
@@ -1748,7 +1749,7 @@ static int lagrange_top_block(lagrange_top_solver *s, lagrange_top_table *table,
     for (int stage = 0; stage < 1; ++stage) {
         lagrange_top_memory *memory = &s->memory[stage];
         for (int lane = 0; lane < lagrange_top_LANES; ++lane) {
-            for (int i = 0; i < 6; ++i) value[i] = line[stage].y[i][lane];
+            for (int i = 0; i < 6; ++i) value[i] = model[stage].y[i][lane];
             lagrange_top_record(memory, value);
         }
         memory->slow = passes > 1 ? memory->slow + lagrange_top_LANES : 0;
@@ -1810,7 +1811,7 @@ lagrange_top_status lagrange_top_integrate(lagrange_top_solver *s, double h, siz
     while (status == lagrange_top_OK && steps > 0) {
         if (steps >= lagrange_top_LANES && s->pause == 0) lagrange_top_choose_guess(s, steps);
         if (steps >= lagrange_top_LANES && s->pause == 0) {
-            lagrange_top_tell(s, &table);
+            lagrange_top_refresh(s, &table);
             const int passes = lagrange_top_block(s, &table, (int)(2 * s->effort + 0.5));
             lagrange_top_learn_from(s, passes);
             if (passes > 0) steps -= lagrange_top_LANES;
@@ -1970,24 +1971,24 @@ static void lagrange_top_group_predict(lagrange_top_group *group, int stage, lag
 
 /* Newton's method for a stage, until the slowest lane is solved. The number of iterations; where that is the most
    allowed, lanes that are not solved leave the group. */
-static int lagrange_top_group_solve(lagrange_top_group *group, int stage, lagrange_top_lines *line)
+static int lagrange_top_group_solve(lagrange_top_group *group, int stage, lagrange_top_model *model)
 {
     lagrange_top_lanes size, previous, bound;
     double largest = HUGE_VAL, bend = 0.0;
     int iterations = 0, open = 1;
     for (int lane = 0; lane < lagrange_top_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
-    lagrange_top_group_predict(group, stage, line->y);
+    lagrange_top_group_predict(group, stage, model->y);
     for (; open > 0 && iterations < 20; ++iterations) {
         memcpy(previous, size, sizeof size);
-        lagrange_top_update(group->coef[stage], line, largest > 1e-05);
+        lagrange_top_update(group->coef[stage], model, largest > 1e-05);
         bend = largest > 1e-05 ? 0.0 : bend + largest;
         for (int i = 0; i < 6; ++i) {
             lagrange_top_EACH_LANE
             for (int lane = 0; lane < lagrange_top_LANES; ++lane)
-                line->residual[i][lane] =
-                    ((line->y[i][lane] - group->x[i][lane]) + line->displacement[i][lane]) - group->carry[i][lane];
+                model->residual[i][lane] =
+                    ((model->y[i][lane] - group->x[i][lane]) + model->displacement[i][lane]) - group->carry[i][lane];
         }
-        lagrange_top_correct(line, size);
+        lagrange_top_correct(model, size);
         open = lagrange_top_group_open(group, size, previous, bend, bound);
         largest = lagrange_top_largest(size);
     }
@@ -1998,18 +1999,18 @@ static int lagrange_top_group_solve(lagrange_top_group *group, int stage, lagran
 
 /* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
 static void lagrange_top_group_advance(lagrange_top_lanes x[restrict 6], lagrange_top_lanes carry[restrict 6],
-    lagrange_top_lines *line)
+    lagrange_top_model *model)
 {
     for (int i = 0; i < 6; ++i)
         for (int j = 0; j < 6; ++j) {
             lagrange_top_EACH_LANE
             for (int lane = 0; lane < lagrange_top_LANES; ++lane)
-                carry[i][lane] -= line->gain[i * 6 + j][lane] * line->residual[j][lane];
+                carry[i][lane] -= model->gain[i * 6 + j][lane] * model->residual[j][lane];
         }
     for (int i = 0; i < 6; ++i) {
         lagrange_top_EACH_LANE
         for (int lane = 0; lane < lagrange_top_LANES; ++lane) {
-            const double change = line->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
+            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
             const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
             x[i][lane] = sum + small;
             carry[i][lane] = small - (x[i][lane] - sum);
@@ -2021,17 +2022,17 @@ static void lagrange_top_group_advance(lagrange_top_lanes x[restrict 6], lagrang
 static int lagrange_top_group_step(lagrange_top_group *group, size_t remaining)
 {
     lagrange_top_lanes x[6], carry[6];
-    lagrange_top_lines line;
+    lagrange_top_model model;
     const int next = (group->latest + 96 - 1) % 96;
     int active = 0, most = 0;
     memcpy(x, group->x, sizeof x);
     memcpy(carry, group->carry, sizeof carry);
     for (int stage = 0; stage < 1; ++stage) {
-        const int iterations = lagrange_top_group_solve(group, stage, &line);
-        lagrange_top_group_advance(group->x, group->carry, &line);
-        if (next % 8 == 0 || group->count < 8) lagrange_top_group_judge(group, stage, line.y);
+        const int iterations = lagrange_top_group_solve(group, stage, &model);
+        lagrange_top_group_advance(group->x, group->carry, &model);
+        if (next % 8 == 0 || group->count < 8) lagrange_top_group_judge(group, stage, model.y);
         if (iterations > most) most = iterations;
-        memcpy(group->past[stage][next], line.y, sizeof line.y);
+        memcpy(group->past[stage][next], model.y, sizeof model.y);
     }
     group->latest = next;
     if (group->count < 96) ++group->count;
@@ -2128,6 +2129,10 @@ lagrange_top_status lagrange_top_ensemble(const lagrange_top_params *params, dou
     }
     return worst;
 }
+
+#if defined(__clang__)
+#pragma clang diagnostic pop
+#endif
 
 /* the Hamiltonian */
 static void lagrange_top_energy(const lagrange_top_params *params, const double x[6],

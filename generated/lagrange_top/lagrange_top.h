@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: c84ace41d9196f0a2a3a08b1f6e26315f62e6966d23c0c1bc94cf74424deeef9
+ * body-sha256: 16d6479257ed497c294bcfc11831e67e1a4876b22ae0bcac9d0f13477b208ac8
  */
 #ifndef LAGRANGE_TOP_H
 #define LAGRANGE_TOP_H
@@ -73,7 +73,7 @@ typedef struct {
     int pause;      /* steps to make singly before a block is tried */
     int setback;    /* the last pause, halved with every block that succeeds */
     int foreseeing; /* whether blocks are guessed by recurrences */
-    int passes;     /* that the last block took which was not */
+    int passes;     /* that the last block took which was guessed by Runge-Kutta steps */
     size_t doubt;   /* steps to wait before recurrences are tried again */
     size_t retry;   /* steps after which that is */
     double coef[1][8]; /* what depends on params and h only, for each stage */

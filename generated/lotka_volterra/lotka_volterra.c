@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: a07934ad68bb0acb43b2ae1970978d469fabda3c9e3f43d65a107412d730d020
+ * body-sha256: 594e2983aa73e540846cc86be51c6e48619918b0ceeb85664691d5c0001bbf24
  */
 #include "lotka_volterra.h"
 
@@ -430,6 +430,7 @@ typedef double lotka_volterra_lanes[lotka_volterra_LANES];
 
 #if defined(__clang__)
 #define lotka_volterra_EACH_LANE _Pragma("clang loop vectorize(assume_safety)")
+#pragma clang diagnostic push
 #pragma clang diagnostic ignored "-Wpass-failed"
 #elif defined(__GNUC__)
 #define lotka_volterra_EACH_LANE _Pragma("GCC ivdep") _Pragma("GCC unroll 1")
@@ -443,12 +444,12 @@ typedef struct {
     lotka_volterra_lanes coef[1][1], weight[1][32][3];
 } lotka_volterra_table;
 
-/* A stage in all lanes, linear around y: a residual r of alpha(y) = x takes inverse r from y and gain r from the
+/* A stage in all lanes, linearised around y: a residual r of alpha(y) = x takes inverse r from y and gain r from the
    increment. */
 typedef struct {
     lotka_volterra_lanes y[3], displacement[3], increment[3], residual[3];
     lotka_volterra_lanes inverse[9], slope[9], gain[9];
-} lotka_volterra_lines;
+} lotka_volterra_model;
 
 /* exp(u) - 1 for the loops over lanes: u = k log 2 + r, no branches. Infinite beyond |u| = 700.0. */
 static inline double lotka_volterra_expm1_lane(double u)
@@ -621,15 +622,15 @@ static void lotka_volterra_invert_lanes(lotka_volterra_lanes matrix[restrict 9],
 }
 
 /* Everything about a stage at the points y. The matrices are I + O(h): where a pivot is far from 1, all is infinite. */
-static void lotka_volterra_tabulate(lotka_volterra_lanes coef[restrict], lotka_volterra_lines *line)
+static void lotka_volterra_tabulate(lotka_volterra_lanes coef[restrict], lotka_volterra_model *model)
 {
     lotka_volterra_lanes jacobian[9], reciprocal[3];
-    lotka_volterra_linearise_lanes(coef, line->y, line->displacement, line->increment, jacobian, line->slope);
-    lotka_volterra_invert_lanes(jacobian, line->slope, line->inverse, line->gain, reciprocal);
+    lotka_volterra_linearise_lanes(coef, model->y, model->displacement, model->increment, jacobian, model->slope);
+    lotka_volterra_invert_lanes(jacobian, model->slope, model->inverse, model->gain, reciprocal);
     for (int i = 0; i < 3; ++i) {
         lotka_volterra_EACH_LANE
         for (int lane = 0; lane < lotka_volterra_LANES; ++lane)
-            line->inverse[i][lane] += fabs(reciprocal[i][lane]) < 1e3 ? 0.0 : HUGE_VAL;
+            model->inverse[i][lane] += fabs(reciprocal[i][lane]) < 1e3 ? 0.0 : HUGE_VAL;
     }
 }
 
@@ -650,7 +651,7 @@ static void lotka_volterra_sizes(lotka_volterra_lanes y[restrict 3], lotka_volte
 }
 
 /* Correct y by the residuals, with the inverse in the table, and measure the corrections. */
-static void lotka_volterra_correct(lotka_volterra_lines *line, lotka_volterra_lanes size)
+static void lotka_volterra_correct(lotka_volterra_model *model, lotka_volterra_lanes size)
 {
     lotka_volterra_lanes delta[3];
     memset(delta, 0, sizeof delta);
@@ -658,15 +659,15 @@ static void lotka_volterra_correct(lotka_volterra_lines *line, lotka_volterra_la
         for (int j = 0; j < 3; ++j) {
             lotka_volterra_EACH_LANE
             for (int lane = 0; lane < lotka_volterra_LANES; ++lane)
-                delta[i][lane] += line->inverse[i * 3 + j][lane] * line->residual[j][lane];
+                delta[i][lane] += model->inverse[i * 3 + j][lane] * model->residual[j][lane];
         }
-    lotka_volterra_sizes(line->y, delta, size);
+    lotka_volterra_sizes(model->y, delta, size);
     for (int i = 0; i < 3; ++i)
-        for (int lane = 0; lane < lotka_volterra_LANES; ++lane) line->y[i][lane] -= delta[i][lane];
+        for (int lane = 0; lane < lotka_volterra_LANES; ++lane) model->y[i][lane] -= delta[i][lane];
 }
 
-/* The largest of the lanes, which are not negative; infinite if one is not finite. As integers, the bits of numbers that are not negative have their
-   order, and those of what is no number are larger. */
+/* The largest of the lanes, none of which is negative; infinite if one is not finite. As integers, the bits of such
+   numbers have their order, and those of what is no number are larger. */
 static double lotka_volterra_largest(const lotka_volterra_lanes size)
 {
     uint64_t bits[8], most = 0;
@@ -699,27 +700,27 @@ static double lotka_volterra_remaining(double size, double bend, double bound)
 }
 
 /* The table of a stage, with its matrices or with those of the last pass. */
-static void lotka_volterra_update(lotka_volterra_lanes coef[restrict], lotka_volterra_lines *line, int matrices)
+static void lotka_volterra_update(lotka_volterra_lanes coef[restrict], lotka_volterra_model *model, int matrices)
 {
     if (matrices)
-        lotka_volterra_tabulate(coef, line);
+        lotka_volterra_tabulate(coef, model);
     else
-        lotka_volterra_evaluate_lanes(coef, line->y, line->displacement, line->increment);
+        lotka_volterra_evaluate_lanes(coef, model->y, model->displacement, model->increment);
 }
 
-/* The steps of a block one after the other, each along the lines of its lane. As X, the state with its carry, gains
+/* The steps of a block one after the other, each along the linear model of its lane. As X, the state with its carry, gains
    increment - gain residual, the next residual follows from this one; X itself is added up apart. */
-static void lotka_volterra_chain(lotka_volterra_lines line[1], double x[3], double carry[3])
+static void lotka_volterra_chain(lotka_volterra_model model[1], double x[3], double carry[3])
 {
     double residual[3], sum[3], small[3];
     for (int i = 0; i < 3; ++i) {
-        residual[i] = ((line->y[i][0] - x[i]) + line->displacement[i][0]) - carry[i];
+        residual[i] = ((model->y[i][0] - x[i]) + model->displacement[i][0]) - carry[i];
         sum[i] = x[i];
         small[i] = carry[i];
     }
     for (int k = 0; k < 1 * lotka_volterra_LANES; ++k) {
         const int lane = k / 1, after = (k + 1) / 1 % lotka_volterra_LANES;
-        lotka_volterra_lines *at = &line[k % 1], *next = &line[(k + 1) % 1];
+        lotka_volterra_model *at = &model[k % 1], *next = &model[(k + 1) % 1];
         double even[3] = { 0.0 }, odd[3] = { 0.0 }; /* two sums, so that no long chain of additions is waited for */
         for (int i = 0; i < 3; ++i) {
             at->residual[i][lane] = residual[i];
@@ -741,8 +742,8 @@ static void lotka_volterra_chain(lotka_volterra_lines line[1], double x[3], doub
     }
 }
 
-/* Bring the table up to date. */
-static void lotka_volterra_tell(const lotka_volterra_solver *s, lotka_volterra_table *table)
+/* Bring the table up to date: coefficients, and weights that were fitted since. */
+static void lotka_volterra_refresh(const lotka_volterra_solver *s, lotka_volterra_table *table)
 {
     for (int stage = 0; stage < 1; ++stage) {
         if (table->fits[stage] == s->memory[stage].fits) continue;
@@ -773,7 +774,7 @@ static void lotka_volterra_foresee(const lotka_volterra_memory *memory, lotka_vo
 
 /* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
    method, to leading order. */
-static void lotka_volterra_march(const lotka_volterra_solver *s, lotka_volterra_table *table, lotka_volterra_lines line[1])
+static void lotka_volterra_march(const lotka_volterra_solver *s, lotka_volterra_table *table, lotka_volterra_model model[1])
 {
     static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
     double x[3], point[3], slope[3], mean[3];
@@ -790,12 +791,12 @@ static void lotka_volterra_march(const lotka_volterra_solver *s, lotka_volterra_
             }
         }
         for (int i = 0; i < 3; ++i) {
-            line[k % 1].y[i][k / 1] = x[i] + 0.5 * h * mean[i];
+            model[k % 1].y[i][k / 1] = x[i] + 0.5 * h * mean[i];
             x[i] += h * mean[i];
         }
     }
     for (int stage = 0; stage < 1; ++stage) {
-        lotka_volterra_lines *at = &line[stage];
+        lotka_volterra_model *at = &model[stage];
         lotka_volterra_evaluate_lanes(table->coef[stage], at->y, at->displacement, at->increment);
         for (int i = 0; i < 3; ++i) {
             lotka_volterra_EACH_LANE
@@ -809,24 +810,24 @@ static void lotka_volterra_march(const lotka_volterra_solver *s, lotka_volterra_
    small as after a single step. How many passes that took; 0, and the solver as before, where it takes more than most. */
 static int lotka_volterra_block(lotka_volterra_solver *s, lotka_volterra_table *table, int most)
 {
-    lotka_volterra_lines line[1];
+    lotka_volterra_model model[1];
     lotka_volterra_lanes sizes;
     double x[3], carry[3], value[3], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
-    if (!s->foreseeing) lotka_volterra_march(s, table, line);
+    if (!s->foreseeing) lotka_volterra_march(s, table, model);
     for (int stage = 0; stage < 1; ++stage) {
-        if (s->foreseeing) lotka_volterra_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
-        if (!lotka_volterra_near_lanes(line[stage].y, s->x)) return 0;
+        if (s->foreseeing) lotka_volterra_foresee(&s->memory[stage], table->weight[stage], model[stage].y);
+        if (!lotka_volterra_near_lanes(model[stage].y, s->x)) return 0;
     }
     while (!solved) {
         double size = 0.0;
         const int matrices = previous > 1e-05;
-        for (int stage = 0; stage < 1; ++stage) lotka_volterra_update(table->coef[stage], &line[stage], matrices);
+        for (int stage = 0; stage < 1; ++stage) lotka_volterra_update(table->coef[stage], &model[stage], matrices);
         memcpy(x, s->x, sizeof x);
         memcpy(carry, s->carry, sizeof carry);
-        lotka_volterra_chain(line, x, carry);
+        lotka_volterra_chain(model, x, carry);
         for (int stage = 0; stage < 1; ++stage) {
-            lotka_volterra_correct(&line[stage], sizes);
+            lotka_volterra_correct(&model[stage], sizes);
             const double largest = lotka_volterra_largest(sizes);
             size = largest > size ? largest : size;
         }
@@ -846,7 +847,7 @@ static int lotka_volterra_block(lotka_volterra_solver *s, lotka_volterra_table *
     for (int stage = 0; stage < 1; ++stage) {
         lotka_volterra_memory *memory = &s->memory[stage];
         for (int lane = 0; lane < lotka_volterra_LANES; ++lane) {
-            for (int i = 0; i < 3; ++i) value[i] = line[stage].y[i][lane];
+            for (int i = 0; i < 3; ++i) value[i] = model[stage].y[i][lane];
             lotka_volterra_record(memory, value);
         }
         memory->slow = passes > 1 ? memory->slow + lotka_volterra_LANES : 0;
@@ -908,7 +909,7 @@ lotka_volterra_status lotka_volterra_integrate(lotka_volterra_solver *s, double 
     while (status == lotka_volterra_OK && steps > 0) {
         if (steps >= lotka_volterra_LANES && s->pause == 0) lotka_volterra_choose_guess(s, steps);
         if (steps >= lotka_volterra_LANES && s->pause == 0) {
-            lotka_volterra_tell(s, &table);
+            lotka_volterra_refresh(s, &table);
             const int passes = lotka_volterra_block(s, &table, (int)(2 * s->effort + 0.5));
             lotka_volterra_learn_from(s, passes);
             if (passes > 0) steps -= lotka_volterra_LANES;
@@ -1068,24 +1069,24 @@ static void lotka_volterra_group_predict(lotka_volterra_group *group, int stage,
 
 /* Newton's method for a stage, until the slowest lane is solved. The number of iterations; where that is the most
    allowed, lanes that are not solved leave the group. */
-static int lotka_volterra_group_solve(lotka_volterra_group *group, int stage, lotka_volterra_lines *line)
+static int lotka_volterra_group_solve(lotka_volterra_group *group, int stage, lotka_volterra_model *model)
 {
     lotka_volterra_lanes size, previous, bound;
     double largest = HUGE_VAL, bend = 0.0;
     int iterations = 0, open = 1;
     for (int lane = 0; lane < lotka_volterra_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
-    lotka_volterra_group_predict(group, stage, line->y);
+    lotka_volterra_group_predict(group, stage, model->y);
     for (; open > 0 && iterations < 20; ++iterations) {
         memcpy(previous, size, sizeof size);
-        lotka_volterra_update(group->coef[stage], line, largest > 1e-05);
+        lotka_volterra_update(group->coef[stage], model, largest > 1e-05);
         bend = largest > 1e-05 ? 0.0 : bend + largest;
         for (int i = 0; i < 3; ++i) {
             lotka_volterra_EACH_LANE
             for (int lane = 0; lane < lotka_volterra_LANES; ++lane)
-                line->residual[i][lane] =
-                    ((line->y[i][lane] - group->x[i][lane]) + line->displacement[i][lane]) - group->carry[i][lane];
+                model->residual[i][lane] =
+                    ((model->y[i][lane] - group->x[i][lane]) + model->displacement[i][lane]) - group->carry[i][lane];
         }
-        lotka_volterra_correct(line, size);
+        lotka_volterra_correct(model, size);
         open = lotka_volterra_group_open(group, size, previous, bend, bound);
         largest = lotka_volterra_largest(size);
     }
@@ -1096,18 +1097,18 @@ static int lotka_volterra_group_solve(lotka_volterra_group *group, int stage, lo
 
 /* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
 static void lotka_volterra_group_advance(lotka_volterra_lanes x[restrict 3], lotka_volterra_lanes carry[restrict 3],
-    lotka_volterra_lines *line)
+    lotka_volterra_model *model)
 {
     for (int i = 0; i < 3; ++i)
         for (int j = 0; j < 3; ++j) {
             lotka_volterra_EACH_LANE
             for (int lane = 0; lane < lotka_volterra_LANES; ++lane)
-                carry[i][lane] -= line->gain[i * 3 + j][lane] * line->residual[j][lane];
+                carry[i][lane] -= model->gain[i * 3 + j][lane] * model->residual[j][lane];
         }
     for (int i = 0; i < 3; ++i) {
         lotka_volterra_EACH_LANE
         for (int lane = 0; lane < lotka_volterra_LANES; ++lane) {
-            const double change = line->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
+            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
             const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
             x[i][lane] = sum + small;
             carry[i][lane] = small - (x[i][lane] - sum);
@@ -1119,17 +1120,17 @@ static void lotka_volterra_group_advance(lotka_volterra_lanes x[restrict 3], lot
 static int lotka_volterra_group_step(lotka_volterra_group *group, size_t remaining)
 {
     lotka_volterra_lanes x[3], carry[3];
-    lotka_volterra_lines line;
+    lotka_volterra_model model;
     const int next = (group->latest + 96 - 1) % 96;
     int active = 0, most = 0;
     memcpy(x, group->x, sizeof x);
     memcpy(carry, group->carry, sizeof carry);
     for (int stage = 0; stage < 1; ++stage) {
-        const int iterations = lotka_volterra_group_solve(group, stage, &line);
-        lotka_volterra_group_advance(group->x, group->carry, &line);
-        if (next % 8 == 0 || group->count < 8) lotka_volterra_group_judge(group, stage, line.y);
+        const int iterations = lotka_volterra_group_solve(group, stage, &model);
+        lotka_volterra_group_advance(group->x, group->carry, &model);
+        if (next % 8 == 0 || group->count < 8) lotka_volterra_group_judge(group, stage, model.y);
         if (iterations > most) most = iterations;
-        memcpy(group->past[stage][next], line.y, sizeof line.y);
+        memcpy(group->past[stage][next], model.y, sizeof model.y);
     }
     group->latest = next;
     if (group->count < 96) ++group->count;
@@ -1226,6 +1227,10 @@ lotka_volterra_status lotka_volterra_ensemble(const lotka_volterra_params *param
     }
     return worst;
 }
+
+#if defined(__clang__)
+#pragma clang diagnostic pop
+#endif
 
 /* the Hamiltonian */
 static void lotka_volterra_energy(const lotka_volterra_params *params, const double x[3],

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: b7144d11ad8643e31782fba05d805679add7fdb847138f5f611f4fc3159a4832
+ * body-sha256: 6753c135245c5fe4ff09f42547cd91d4681b3863b60e4a9658591194c7e90841
  */
 #ifndef LOTKA_VOLTERRA_H
 #define LOTKA_VOLTERRA_H
@@ -71,7 +71,7 @@ typedef struct {
     int pause;      /* steps to make singly before a block is tried */
     int setback;    /* the last pause, halved with every block that succeeds */
     int foreseeing; /* whether blocks are guessed by recurrences */
-    int passes;     /* that the last block took which was not */
+    int passes;     /* that the last block took which was guessed by Runge-Kutta steps */
     size_t doubt;   /* steps to wait before recurrences are tried again */
     size_t retry;   /* steps after which that is */
     double coef[1][1]; /* what depends on params and h only, for each stage */

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 55f9e6605d303a5828e3f7190c3f475b99e8868a5a2f99b81af6124f09adfdd4
+ * body-sha256: b675654fe10fa7e205b1d1846dd8b41e91600472116e9c9156d6c0b5f6c9a541
  */
 #include "maxwell_bloch.h"
 
@@ -420,6 +420,7 @@ typedef double maxwell_bloch_lanes[maxwell_bloch_LANES];
 
 #if defined(__clang__)
 #define maxwell_bloch_EACH_LANE _Pragma("clang loop vectorize(assume_safety)")
+#pragma clang diagnostic push
 #pragma clang diagnostic ignored "-Wpass-failed"
 #elif defined(__GNUC__)
 #define maxwell_bloch_EACH_LANE _Pragma("GCC ivdep") _Pragma("GCC unroll 1")
@@ -433,12 +434,12 @@ typedef struct {
     maxwell_bloch_lanes coef[1][3], weight[1][32][3];
 } maxwell_bloch_table;
 
-/* A stage in all lanes, linear around y: a residual r of alpha(y) = x takes inverse r from y and gain r from the
+/* A stage in all lanes, linearised around y: a residual r of alpha(y) = x takes inverse r from y and gain r from the
    increment. */
 typedef struct {
     maxwell_bloch_lanes y[3], displacement[3], increment[3], residual[3];
     maxwell_bloch_lanes inverse[9], slope[9], gain[9];
-} maxwell_bloch_lines;
+} maxwell_bloch_model;
 
 /* maxwell_bloch_linearise in all lanes. */
 static void maxwell_bloch_linearise_lanes(maxwell_bloch_lanes coef[restrict 3],
@@ -571,15 +572,15 @@ static void maxwell_bloch_invert_lanes(maxwell_bloch_lanes matrix[restrict 9],
 }
 
 /* Everything about a stage at the points y. The matrices are I + O(h): where a pivot is far from 1, all is infinite. */
-static void maxwell_bloch_tabulate(maxwell_bloch_lanes coef[restrict], maxwell_bloch_lines *line)
+static void maxwell_bloch_tabulate(maxwell_bloch_lanes coef[restrict], maxwell_bloch_model *model)
 {
     maxwell_bloch_lanes jacobian[9], reciprocal[3];
-    maxwell_bloch_linearise_lanes(coef, line->y, line->displacement, line->increment, jacobian, line->slope);
-    maxwell_bloch_invert_lanes(jacobian, line->slope, line->inverse, line->gain, reciprocal);
+    maxwell_bloch_linearise_lanes(coef, model->y, model->displacement, model->increment, jacobian, model->slope);
+    maxwell_bloch_invert_lanes(jacobian, model->slope, model->inverse, model->gain, reciprocal);
     for (int i = 0; i < 3; ++i) {
         maxwell_bloch_EACH_LANE
         for (int lane = 0; lane < maxwell_bloch_LANES; ++lane)
-            line->inverse[i][lane] += fabs(reciprocal[i][lane]) < 1e3 ? 0.0 : HUGE_VAL;
+            model->inverse[i][lane] += fabs(reciprocal[i][lane]) < 1e3 ? 0.0 : HUGE_VAL;
     }
 }
 
@@ -600,7 +601,7 @@ static void maxwell_bloch_sizes(maxwell_bloch_lanes y[restrict 3], maxwell_bloch
 }
 
 /* Correct y by the residuals, with the inverse in the table, and measure the corrections. */
-static void maxwell_bloch_correct(maxwell_bloch_lines *line, maxwell_bloch_lanes size)
+static void maxwell_bloch_correct(maxwell_bloch_model *model, maxwell_bloch_lanes size)
 {
     maxwell_bloch_lanes delta[3];
     memset(delta, 0, sizeof delta);
@@ -608,15 +609,15 @@ static void maxwell_bloch_correct(maxwell_bloch_lines *line, maxwell_bloch_lanes
         for (int j = 0; j < 3; ++j) {
             maxwell_bloch_EACH_LANE
             for (int lane = 0; lane < maxwell_bloch_LANES; ++lane)
-                delta[i][lane] += line->inverse[i * 3 + j][lane] * line->residual[j][lane];
+                delta[i][lane] += model->inverse[i * 3 + j][lane] * model->residual[j][lane];
         }
-    maxwell_bloch_sizes(line->y, delta, size);
+    maxwell_bloch_sizes(model->y, delta, size);
     for (int i = 0; i < 3; ++i)
-        for (int lane = 0; lane < maxwell_bloch_LANES; ++lane) line->y[i][lane] -= delta[i][lane];
+        for (int lane = 0; lane < maxwell_bloch_LANES; ++lane) model->y[i][lane] -= delta[i][lane];
 }
 
-/* The largest of the lanes, which are not negative; infinite if one is not finite. As integers, the bits of numbers that are not negative have their
-   order, and those of what is no number are larger. */
+/* The largest of the lanes, none of which is negative; infinite if one is not finite. As integers, the bits of such
+   numbers have their order, and those of what is no number are larger. */
 static double maxwell_bloch_largest(const maxwell_bloch_lanes size)
 {
     uint64_t bits[8], most = 0;
@@ -649,27 +650,27 @@ static double maxwell_bloch_remaining(double size, double bend, double bound)
 }
 
 /* The table of a stage, with its matrices or with those of the last pass. */
-static void maxwell_bloch_update(maxwell_bloch_lanes coef[restrict], maxwell_bloch_lines *line, int matrices)
+static void maxwell_bloch_update(maxwell_bloch_lanes coef[restrict], maxwell_bloch_model *model, int matrices)
 {
     if (matrices)
-        maxwell_bloch_tabulate(coef, line);
+        maxwell_bloch_tabulate(coef, model);
     else
-        maxwell_bloch_evaluate_lanes(coef, line->y, line->displacement, line->increment);
+        maxwell_bloch_evaluate_lanes(coef, model->y, model->displacement, model->increment);
 }
 
-/* The steps of a block one after the other, each along the lines of its lane. As X, the state with its carry, gains
+/* The steps of a block one after the other, each along the linear model of its lane. As X, the state with its carry, gains
    increment - gain residual, the next residual follows from this one; X itself is added up apart. */
-static void maxwell_bloch_chain(maxwell_bloch_lines line[1], double x[3], double carry[3])
+static void maxwell_bloch_chain(maxwell_bloch_model model[1], double x[3], double carry[3])
 {
     double residual[3], sum[3], small[3];
     for (int i = 0; i < 3; ++i) {
-        residual[i] = ((line->y[i][0] - x[i]) + line->displacement[i][0]) - carry[i];
+        residual[i] = ((model->y[i][0] - x[i]) + model->displacement[i][0]) - carry[i];
         sum[i] = x[i];
         small[i] = carry[i];
     }
     for (int k = 0; k < 1 * maxwell_bloch_LANES; ++k) {
         const int lane = k / 1, after = (k + 1) / 1 % maxwell_bloch_LANES;
-        maxwell_bloch_lines *at = &line[k % 1], *next = &line[(k + 1) % 1];
+        maxwell_bloch_model *at = &model[k % 1], *next = &model[(k + 1) % 1];
         double even[3] = { 0.0 }, odd[3] = { 0.0 }; /* two sums, so that no long chain of additions is waited for */
         for (int i = 0; i < 3; ++i) {
             at->residual[i][lane] = residual[i];
@@ -691,8 +692,8 @@ static void maxwell_bloch_chain(maxwell_bloch_lines line[1], double x[3], double
     }
 }
 
-/* Bring the table up to date. */
-static void maxwell_bloch_tell(const maxwell_bloch_solver *s, maxwell_bloch_table *table)
+/* Bring the table up to date: coefficients, and weights that were fitted since. */
+static void maxwell_bloch_refresh(const maxwell_bloch_solver *s, maxwell_bloch_table *table)
 {
     for (int stage = 0; stage < 1; ++stage) {
         if (table->fits[stage] == s->memory[stage].fits) continue;
@@ -723,7 +724,7 @@ static void maxwell_bloch_foresee(const maxwell_bloch_memory *memory, maxwell_bl
 
 /* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
    method, to leading order. */
-static void maxwell_bloch_march(const maxwell_bloch_solver *s, maxwell_bloch_table *table, maxwell_bloch_lines line[1])
+static void maxwell_bloch_march(const maxwell_bloch_solver *s, maxwell_bloch_table *table, maxwell_bloch_model model[1])
 {
     static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
     double x[3], point[3], slope[3], mean[3];
@@ -740,12 +741,12 @@ static void maxwell_bloch_march(const maxwell_bloch_solver *s, maxwell_bloch_tab
             }
         }
         for (int i = 0; i < 3; ++i) {
-            line[k % 1].y[i][k / 1] = x[i] + 0.5 * h * mean[i];
+            model[k % 1].y[i][k / 1] = x[i] + 0.5 * h * mean[i];
             x[i] += h * mean[i];
         }
     }
     for (int stage = 0; stage < 1; ++stage) {
-        maxwell_bloch_lines *at = &line[stage];
+        maxwell_bloch_model *at = &model[stage];
         maxwell_bloch_evaluate_lanes(table->coef[stage], at->y, at->displacement, at->increment);
         for (int i = 0; i < 3; ++i) {
             maxwell_bloch_EACH_LANE
@@ -759,24 +760,24 @@ static void maxwell_bloch_march(const maxwell_bloch_solver *s, maxwell_bloch_tab
    small as after a single step. How many passes that took; 0, and the solver as before, where it takes more than most. */
 static int maxwell_bloch_block(maxwell_bloch_solver *s, maxwell_bloch_table *table, int most)
 {
-    maxwell_bloch_lines line[1];
+    maxwell_bloch_model model[1];
     maxwell_bloch_lanes sizes;
     double x[3], carry[3], value[3], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
-    if (!s->foreseeing) maxwell_bloch_march(s, table, line);
+    if (!s->foreseeing) maxwell_bloch_march(s, table, model);
     for (int stage = 0; stage < 1; ++stage) {
-        if (s->foreseeing) maxwell_bloch_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
-        if (!maxwell_bloch_near_lanes(line[stage].y, s->x)) return 0;
+        if (s->foreseeing) maxwell_bloch_foresee(&s->memory[stage], table->weight[stage], model[stage].y);
+        if (!maxwell_bloch_near_lanes(model[stage].y, s->x)) return 0;
     }
     while (!solved) {
         double size = 0.0;
         const int matrices = previous > 1e-05;
-        for (int stage = 0; stage < 1; ++stage) maxwell_bloch_update(table->coef[stage], &line[stage], matrices);
+        for (int stage = 0; stage < 1; ++stage) maxwell_bloch_update(table->coef[stage], &model[stage], matrices);
         memcpy(x, s->x, sizeof x);
         memcpy(carry, s->carry, sizeof carry);
-        maxwell_bloch_chain(line, x, carry);
+        maxwell_bloch_chain(model, x, carry);
         for (int stage = 0; stage < 1; ++stage) {
-            maxwell_bloch_correct(&line[stage], sizes);
+            maxwell_bloch_correct(&model[stage], sizes);
             const double largest = maxwell_bloch_largest(sizes);
             size = largest > size ? largest : size;
         }
@@ -796,7 +797,7 @@ static int maxwell_bloch_block(maxwell_bloch_solver *s, maxwell_bloch_table *tab
     for (int stage = 0; stage < 1; ++stage) {
         maxwell_bloch_memory *memory = &s->memory[stage];
         for (int lane = 0; lane < maxwell_bloch_LANES; ++lane) {
-            for (int i = 0; i < 3; ++i) value[i] = line[stage].y[i][lane];
+            for (int i = 0; i < 3; ++i) value[i] = model[stage].y[i][lane];
             maxwell_bloch_record(memory, value);
         }
         memory->slow = passes > 1 ? memory->slow + maxwell_bloch_LANES : 0;
@@ -858,7 +859,7 @@ maxwell_bloch_status maxwell_bloch_integrate(maxwell_bloch_solver *s, double h, 
     while (status == maxwell_bloch_OK && steps > 0) {
         if (steps >= maxwell_bloch_LANES && s->pause == 0) maxwell_bloch_choose_guess(s, steps);
         if (steps >= maxwell_bloch_LANES && s->pause == 0) {
-            maxwell_bloch_tell(s, &table);
+            maxwell_bloch_refresh(s, &table);
             const int passes = maxwell_bloch_block(s, &table, (int)(2 * s->effort + 0.5));
             maxwell_bloch_learn_from(s, passes);
             if (passes > 0) steps -= maxwell_bloch_LANES;
@@ -1018,24 +1019,24 @@ static void maxwell_bloch_group_predict(maxwell_bloch_group *group, int stage, m
 
 /* Newton's method for a stage, until the slowest lane is solved. The number of iterations; where that is the most
    allowed, lanes that are not solved leave the group. */
-static int maxwell_bloch_group_solve(maxwell_bloch_group *group, int stage, maxwell_bloch_lines *line)
+static int maxwell_bloch_group_solve(maxwell_bloch_group *group, int stage, maxwell_bloch_model *model)
 {
     maxwell_bloch_lanes size, previous, bound;
     double largest = HUGE_VAL, bend = 0.0;
     int iterations = 0, open = 1;
     for (int lane = 0; lane < maxwell_bloch_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
-    maxwell_bloch_group_predict(group, stage, line->y);
+    maxwell_bloch_group_predict(group, stage, model->y);
     for (; open > 0 && iterations < 20; ++iterations) {
         memcpy(previous, size, sizeof size);
-        maxwell_bloch_update(group->coef[stage], line, largest > 1e-05);
+        maxwell_bloch_update(group->coef[stage], model, largest > 1e-05);
         bend = largest > 1e-05 ? 0.0 : bend + largest;
         for (int i = 0; i < 3; ++i) {
             maxwell_bloch_EACH_LANE
             for (int lane = 0; lane < maxwell_bloch_LANES; ++lane)
-                line->residual[i][lane] =
-                    ((line->y[i][lane] - group->x[i][lane]) + line->displacement[i][lane]) - group->carry[i][lane];
+                model->residual[i][lane] =
+                    ((model->y[i][lane] - group->x[i][lane]) + model->displacement[i][lane]) - group->carry[i][lane];
         }
-        maxwell_bloch_correct(line, size);
+        maxwell_bloch_correct(model, size);
         open = maxwell_bloch_group_open(group, size, previous, bend, bound);
         largest = maxwell_bloch_largest(size);
     }
@@ -1046,18 +1047,18 @@ static int maxwell_bloch_group_solve(maxwell_bloch_group *group, int stage, maxw
 
 /* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
 static void maxwell_bloch_group_advance(maxwell_bloch_lanes x[restrict 3], maxwell_bloch_lanes carry[restrict 3],
-    maxwell_bloch_lines *line)
+    maxwell_bloch_model *model)
 {
     for (int i = 0; i < 3; ++i)
         for (int j = 0; j < 3; ++j) {
             maxwell_bloch_EACH_LANE
             for (int lane = 0; lane < maxwell_bloch_LANES; ++lane)
-                carry[i][lane] -= line->gain[i * 3 + j][lane] * line->residual[j][lane];
+                carry[i][lane] -= model->gain[i * 3 + j][lane] * model->residual[j][lane];
         }
     for (int i = 0; i < 3; ++i) {
         maxwell_bloch_EACH_LANE
         for (int lane = 0; lane < maxwell_bloch_LANES; ++lane) {
-            const double change = line->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
+            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
             const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
             x[i][lane] = sum + small;
             carry[i][lane] = small - (x[i][lane] - sum);
@@ -1069,17 +1070,17 @@ static void maxwell_bloch_group_advance(maxwell_bloch_lanes x[restrict 3], maxwe
 static int maxwell_bloch_group_step(maxwell_bloch_group *group, size_t remaining)
 {
     maxwell_bloch_lanes x[3], carry[3];
-    maxwell_bloch_lines line;
+    maxwell_bloch_model model;
     const int next = (group->latest + 96 - 1) % 96;
     int active = 0, most = 0;
     memcpy(x, group->x, sizeof x);
     memcpy(carry, group->carry, sizeof carry);
     for (int stage = 0; stage < 1; ++stage) {
-        const int iterations = maxwell_bloch_group_solve(group, stage, &line);
-        maxwell_bloch_group_advance(group->x, group->carry, &line);
-        if (next % 8 == 0 || group->count < 8) maxwell_bloch_group_judge(group, stage, line.y);
+        const int iterations = maxwell_bloch_group_solve(group, stage, &model);
+        maxwell_bloch_group_advance(group->x, group->carry, &model);
+        if (next % 8 == 0 || group->count < 8) maxwell_bloch_group_judge(group, stage, model.y);
         if (iterations > most) most = iterations;
-        memcpy(group->past[stage][next], line.y, sizeof line.y);
+        memcpy(group->past[stage][next], model.y, sizeof model.y);
     }
     group->latest = next;
     if (group->count < 96) ++group->count;
@@ -1176,6 +1177,10 @@ maxwell_bloch_status maxwell_bloch_ensemble(const maxwell_bloch_params *params, 
     }
     return worst;
 }
+
+#if defined(__clang__)
+#pragma clang diagnostic pop
+#endif
 
 /* the Hamiltonian */
 static void maxwell_bloch_energy(const maxwell_bloch_params *params, const double x[3],

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 8911119f719571552534413301e2af7f6f0897e08c64a83391e729700c784db3
+ * body-sha256: 8ce6d542217891d154268e9502560433ff09e25b7c34ac849e198e72cd73670c
  */
 #ifndef MAXWELL_BLOCH_H
 #define MAXWELL_BLOCH_H
@@ -71,7 +71,7 @@ typedef struct {
     int pause;      /* steps to make singly before a block is tried */
     int setback;    /* the last pause, halved with every block that succeeds */
     int foreseeing; /* whether blocks are guessed by recurrences */
-    int passes;     /* that the last block took which was not */
+    int passes;     /* that the last block took which was guessed by Runge-Kutta steps */
     size_t doubt;   /* steps to wait before recurrences are tried again */
     size_t retry;   /* steps after which that is */
     double coef[1][3]; /* what depends on params and h only, for each stage */

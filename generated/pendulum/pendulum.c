@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: ee959776c61909fa15d434989ae3314cd7b447697ae18a1152894401316480d2
+ * body-sha256: 7c1131077d0433193ad5f32fa8bd0455cb3fd057ee98818b94be27190b0cec69
  */
 #include "pendulum.h"
 
@@ -424,6 +424,7 @@ typedef double pendulum_lanes[pendulum_LANES];
 
 #if defined(__clang__)
 #define pendulum_EACH_LANE _Pragma("clang loop vectorize(assume_safety)")
+#pragma clang diagnostic push
 #pragma clang diagnostic ignored "-Wpass-failed"
 #elif defined(__GNUC__)
 #define pendulum_EACH_LANE _Pragma("GCC ivdep") _Pragma("GCC unroll 1")
@@ -437,12 +438,12 @@ typedef struct {
     pendulum_lanes coef[1][19], weight[1][32][2];
 } pendulum_table;
 
-/* A stage in all lanes, linear around y: a residual r of alpha(y) = x takes inverse r from y and gain r from the
+/* A stage in all lanes, linearised around y: a residual r of alpha(y) = x takes inverse r from y and gain r from the
    increment. */
 typedef struct {
     pendulum_lanes y[2], displacement[2], increment[2], residual[2];
     pendulum_lanes inverse[4], slope[4], gain[4];
-} pendulum_lines;
+} pendulum_model;
 
 /* sin u for the loops over lanes: u = k pi + r with |r| <= pi/2, no branches. Infinite beyond |u| = 1000000.0. */
 static inline double pendulum_sin_lane(double u)
@@ -584,15 +585,15 @@ static void pendulum_invert_lanes(pendulum_lanes matrix[restrict 4], pendulum_la
 }
 
 /* Everything about a stage at the points y. The matrices are I + O(h): where a pivot is far from 1, all is infinite. */
-static void pendulum_tabulate(pendulum_lanes coef[restrict], pendulum_lines *line)
+static void pendulum_tabulate(pendulum_lanes coef[restrict], pendulum_model *model)
 {
     pendulum_lanes jacobian[4], reciprocal[2];
-    pendulum_linearise_lanes(coef, line->y, line->displacement, line->increment, jacobian, line->slope);
-    pendulum_invert_lanes(jacobian, line->slope, line->inverse, line->gain, reciprocal);
+    pendulum_linearise_lanes(coef, model->y, model->displacement, model->increment, jacobian, model->slope);
+    pendulum_invert_lanes(jacobian, model->slope, model->inverse, model->gain, reciprocal);
     for (int i = 0; i < 2; ++i) {
         pendulum_EACH_LANE
         for (int lane = 0; lane < pendulum_LANES; ++lane)
-            line->inverse[i][lane] += fabs(reciprocal[i][lane]) < 1e3 ? 0.0 : HUGE_VAL;
+            model->inverse[i][lane] += fabs(reciprocal[i][lane]) < 1e3 ? 0.0 : HUGE_VAL;
     }
 }
 
@@ -613,7 +614,7 @@ static void pendulum_sizes(pendulum_lanes y[restrict 2], pendulum_lanes delta[re
 }
 
 /* Correct y by the residuals, with the inverse in the table, and measure the corrections. */
-static void pendulum_correct(pendulum_lines *line, pendulum_lanes size)
+static void pendulum_correct(pendulum_model *model, pendulum_lanes size)
 {
     pendulum_lanes delta[2];
     memset(delta, 0, sizeof delta);
@@ -621,15 +622,15 @@ static void pendulum_correct(pendulum_lines *line, pendulum_lanes size)
         for (int j = 0; j < 2; ++j) {
             pendulum_EACH_LANE
             for (int lane = 0; lane < pendulum_LANES; ++lane)
-                delta[i][lane] += line->inverse[i * 2 + j][lane] * line->residual[j][lane];
+                delta[i][lane] += model->inverse[i * 2 + j][lane] * model->residual[j][lane];
         }
-    pendulum_sizes(line->y, delta, size);
+    pendulum_sizes(model->y, delta, size);
     for (int i = 0; i < 2; ++i)
-        for (int lane = 0; lane < pendulum_LANES; ++lane) line->y[i][lane] -= delta[i][lane];
+        for (int lane = 0; lane < pendulum_LANES; ++lane) model->y[i][lane] -= delta[i][lane];
 }
 
-/* The largest of the lanes, which are not negative; infinite if one is not finite. As integers, the bits of numbers that are not negative have their
-   order, and those of what is no number are larger. */
+/* The largest of the lanes, none of which is negative; infinite if one is not finite. As integers, the bits of such
+   numbers have their order, and those of what is no number are larger. */
 static double pendulum_largest(const pendulum_lanes size)
 {
     uint64_t bits[8], most = 0;
@@ -662,27 +663,27 @@ static double pendulum_remaining(double size, double bend, double bound)
 }
 
 /* The table of a stage, with its matrices or with those of the last pass. */
-static void pendulum_update(pendulum_lanes coef[restrict], pendulum_lines *line, int matrices)
+static void pendulum_update(pendulum_lanes coef[restrict], pendulum_model *model, int matrices)
 {
     if (matrices)
-        pendulum_tabulate(coef, line);
+        pendulum_tabulate(coef, model);
     else
-        pendulum_evaluate_lanes(coef, line->y, line->displacement, line->increment);
+        pendulum_evaluate_lanes(coef, model->y, model->displacement, model->increment);
 }
 
-/* The steps of a block one after the other, each along the lines of its lane. As X, the state with its carry, gains
+/* The steps of a block one after the other, each along the linear model of its lane. As X, the state with its carry, gains
    increment - gain residual, the next residual follows from this one; X itself is added up apart. */
-static void pendulum_chain(pendulum_lines line[1], double x[2], double carry[2])
+static void pendulum_chain(pendulum_model model[1], double x[2], double carry[2])
 {
     double residual[2], sum[2], small[2];
     for (int i = 0; i < 2; ++i) {
-        residual[i] = ((line->y[i][0] - x[i]) + line->displacement[i][0]) - carry[i];
+        residual[i] = ((model->y[i][0] - x[i]) + model->displacement[i][0]) - carry[i];
         sum[i] = x[i];
         small[i] = carry[i];
     }
     for (int k = 0; k < 1 * pendulum_LANES; ++k) {
         const int lane = k / 1, after = (k + 1) / 1 % pendulum_LANES;
-        pendulum_lines *at = &line[k % 1], *next = &line[(k + 1) % 1];
+        pendulum_model *at = &model[k % 1], *next = &model[(k + 1) % 1];
         double even[2] = { 0.0 }, odd[2] = { 0.0 }; /* two sums, so that no long chain of additions is waited for */
         for (int i = 0; i < 2; ++i) {
             at->residual[i][lane] = residual[i];
@@ -704,8 +705,8 @@ static void pendulum_chain(pendulum_lines line[1], double x[2], double carry[2])
     }
 }
 
-/* Bring the table up to date. */
-static void pendulum_tell(const pendulum_solver *s, pendulum_table *table)
+/* Bring the table up to date: coefficients, and weights that were fitted since. */
+static void pendulum_refresh(const pendulum_solver *s, pendulum_table *table)
 {
     for (int stage = 0; stage < 1; ++stage) {
         if (table->fits[stage] == s->memory[stage].fits) continue;
@@ -736,7 +737,7 @@ static void pendulum_foresee(const pendulum_memory *memory, pendulum_lanes weigh
 
 /* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
    method, to leading order. */
-static void pendulum_march(const pendulum_solver *s, pendulum_table *table, pendulum_lines line[1])
+static void pendulum_march(const pendulum_solver *s, pendulum_table *table, pendulum_model model[1])
 {
     static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
     double x[2], point[2], slope[2], mean[2];
@@ -753,12 +754,12 @@ static void pendulum_march(const pendulum_solver *s, pendulum_table *table, pend
             }
         }
         for (int i = 0; i < 2; ++i) {
-            line[k % 1].y[i][k / 1] = x[i] + 0.5 * h * mean[i];
+            model[k % 1].y[i][k / 1] = x[i] + 0.5 * h * mean[i];
             x[i] += h * mean[i];
         }
     }
     for (int stage = 0; stage < 1; ++stage) {
-        pendulum_lines *at = &line[stage];
+        pendulum_model *at = &model[stage];
         pendulum_evaluate_lanes(table->coef[stage], at->y, at->displacement, at->increment);
         for (int i = 0; i < 2; ++i) {
             pendulum_EACH_LANE
@@ -772,24 +773,24 @@ static void pendulum_march(const pendulum_solver *s, pendulum_table *table, pend
    small as after a single step. How many passes that took; 0, and the solver as before, where it takes more than most. */
 static int pendulum_block(pendulum_solver *s, pendulum_table *table, int most)
 {
-    pendulum_lines line[1];
+    pendulum_model model[1];
     pendulum_lanes sizes;
     double x[2], carry[2], value[2], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
-    if (!s->foreseeing) pendulum_march(s, table, line);
+    if (!s->foreseeing) pendulum_march(s, table, model);
     for (int stage = 0; stage < 1; ++stage) {
-        if (s->foreseeing) pendulum_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
-        if (!pendulum_near_lanes(line[stage].y, s->x)) return 0;
+        if (s->foreseeing) pendulum_foresee(&s->memory[stage], table->weight[stage], model[stage].y);
+        if (!pendulum_near_lanes(model[stage].y, s->x)) return 0;
     }
     while (!solved) {
         double size = 0.0;
         const int matrices = previous > 1e-05;
-        for (int stage = 0; stage < 1; ++stage) pendulum_update(table->coef[stage], &line[stage], matrices);
+        for (int stage = 0; stage < 1; ++stage) pendulum_update(table->coef[stage], &model[stage], matrices);
         memcpy(x, s->x, sizeof x);
         memcpy(carry, s->carry, sizeof carry);
-        pendulum_chain(line, x, carry);
+        pendulum_chain(model, x, carry);
         for (int stage = 0; stage < 1; ++stage) {
-            pendulum_correct(&line[stage], sizes);
+            pendulum_correct(&model[stage], sizes);
             const double largest = pendulum_largest(sizes);
             size = largest > size ? largest : size;
         }
@@ -809,7 +810,7 @@ static int pendulum_block(pendulum_solver *s, pendulum_table *table, int most)
     for (int stage = 0; stage < 1; ++stage) {
         pendulum_memory *memory = &s->memory[stage];
         for (int lane = 0; lane < pendulum_LANES; ++lane) {
-            for (int i = 0; i < 2; ++i) value[i] = line[stage].y[i][lane];
+            for (int i = 0; i < 2; ++i) value[i] = model[stage].y[i][lane];
             pendulum_record(memory, value);
         }
         memory->slow = passes > 1 ? memory->slow + pendulum_LANES : 0;
@@ -871,7 +872,7 @@ pendulum_status pendulum_integrate(pendulum_solver *s, double h, size_t steps)
     while (status == pendulum_OK && steps > 0) {
         if (steps >= pendulum_LANES && s->pause == 0) pendulum_choose_guess(s, steps);
         if (steps >= pendulum_LANES && s->pause == 0) {
-            pendulum_tell(s, &table);
+            pendulum_refresh(s, &table);
             const int passes = pendulum_block(s, &table, (int)(2 * s->effort + 0.5));
             pendulum_learn_from(s, passes);
             if (passes > 0) steps -= pendulum_LANES;
@@ -1031,24 +1032,24 @@ static void pendulum_group_predict(pendulum_group *group, int stage, pendulum_la
 
 /* Newton's method for a stage, until the slowest lane is solved. The number of iterations; where that is the most
    allowed, lanes that are not solved leave the group. */
-static int pendulum_group_solve(pendulum_group *group, int stage, pendulum_lines *line)
+static int pendulum_group_solve(pendulum_group *group, int stage, pendulum_model *model)
 {
     pendulum_lanes size, previous, bound;
     double largest = HUGE_VAL, bend = 0.0;
     int iterations = 0, open = 1;
     for (int lane = 0; lane < pendulum_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
-    pendulum_group_predict(group, stage, line->y);
+    pendulum_group_predict(group, stage, model->y);
     for (; open > 0 && iterations < 20; ++iterations) {
         memcpy(previous, size, sizeof size);
-        pendulum_update(group->coef[stage], line, largest > 1e-05);
+        pendulum_update(group->coef[stage], model, largest > 1e-05);
         bend = largest > 1e-05 ? 0.0 : bend + largest;
         for (int i = 0; i < 2; ++i) {
             pendulum_EACH_LANE
             for (int lane = 0; lane < pendulum_LANES; ++lane)
-                line->residual[i][lane] =
-                    ((line->y[i][lane] - group->x[i][lane]) + line->displacement[i][lane]) - group->carry[i][lane];
+                model->residual[i][lane] =
+                    ((model->y[i][lane] - group->x[i][lane]) + model->displacement[i][lane]) - group->carry[i][lane];
         }
-        pendulum_correct(line, size);
+        pendulum_correct(model, size);
         open = pendulum_group_open(group, size, previous, bend, bound);
         largest = pendulum_largest(size);
     }
@@ -1059,18 +1060,18 @@ static int pendulum_group_solve(pendulum_group *group, int stage, pendulum_lines
 
 /* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
 static void pendulum_group_advance(pendulum_lanes x[restrict 2], pendulum_lanes carry[restrict 2],
-    pendulum_lines *line)
+    pendulum_model *model)
 {
     for (int i = 0; i < 2; ++i)
         for (int j = 0; j < 2; ++j) {
             pendulum_EACH_LANE
             for (int lane = 0; lane < pendulum_LANES; ++lane)
-                carry[i][lane] -= line->gain[i * 2 + j][lane] * line->residual[j][lane];
+                carry[i][lane] -= model->gain[i * 2 + j][lane] * model->residual[j][lane];
         }
     for (int i = 0; i < 2; ++i) {
         pendulum_EACH_LANE
         for (int lane = 0; lane < pendulum_LANES; ++lane) {
-            const double change = line->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
+            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
             const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
             x[i][lane] = sum + small;
             carry[i][lane] = small - (x[i][lane] - sum);
@@ -1082,17 +1083,17 @@ static void pendulum_group_advance(pendulum_lanes x[restrict 2], pendulum_lanes 
 static int pendulum_group_step(pendulum_group *group, size_t remaining)
 {
     pendulum_lanes x[2], carry[2];
-    pendulum_lines line;
+    pendulum_model model;
     const int next = (group->latest + 96 - 1) % 96;
     int active = 0, most = 0;
     memcpy(x, group->x, sizeof x);
     memcpy(carry, group->carry, sizeof carry);
     for (int stage = 0; stage < 1; ++stage) {
-        const int iterations = pendulum_group_solve(group, stage, &line);
-        pendulum_group_advance(group->x, group->carry, &line);
-        if (next % 8 == 0 || group->count < 8) pendulum_group_judge(group, stage, line.y);
+        const int iterations = pendulum_group_solve(group, stage, &model);
+        pendulum_group_advance(group->x, group->carry, &model);
+        if (next % 8 == 0 || group->count < 8) pendulum_group_judge(group, stage, model.y);
         if (iterations > most) most = iterations;
-        memcpy(group->past[stage][next], line.y, sizeof line.y);
+        memcpy(group->past[stage][next], model.y, sizeof model.y);
     }
     group->latest = next;
     if (group->count < 96) ++group->count;
@@ -1189,6 +1190,10 @@ pendulum_status pendulum_ensemble(const pendulum_params *params, double *x, size
     }
     return worst;
 }
+
+#if defined(__clang__)
+#pragma clang diagnostic pop
+#endif
 
 /* the Hamiltonian */
 static void pendulum_energy(const pendulum_params *params, const double x[2], double energy[restrict 1])

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: da9fab25a2dca8dce6fbc09c29f0f228946bab39577ad1bb587e14b8c03fd4a8
+ * body-sha256: 0feacdd133ce49d0f8bc43a3563d0ba5a47df89752719a4cfacf4335d9d102e8
  */
 #ifndef PENDULUM_H
 #define PENDULUM_H
@@ -71,7 +71,7 @@ typedef struct {
     int pause;      /* steps to make singly before a block is tried */
     int setback;    /* the last pause, halved with every block that succeeds */
     int foreseeing; /* whether blocks are guessed by recurrences */
-    int passes;     /* that the last block took which was not */
+    int passes;     /* that the last block took which was guessed by Runge-Kutta steps */
     size_t doubt;   /* steps to wait before recurrences are tried again */
     size_t retry;   /* steps after which that is */
     double coef[1][19]; /* what depends on params and h only, for each stage */

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: e3ae7a3aa0acbf339b7a4652883a399f1623202e4914dd7a23920f209d7ff31a
+ * body-sha256: 4485360f7a4be5ed31f934ba2f12ab172799a7e89161f2262f2b405b210cb6cd
  */
 #include "poisson_not_hamiltonian.h"
 
@@ -529,6 +529,7 @@ typedef double poisson_not_hamiltonian_lanes[poisson_not_hamiltonian_LANES];
 
 #if defined(__clang__)
 #define poisson_not_hamiltonian_EACH_LANE _Pragma("clang loop vectorize(assume_safety)")
+#pragma clang diagnostic push
 #pragma clang diagnostic ignored "-Wpass-failed"
 #elif defined(__GNUC__)
 #define poisson_not_hamiltonian_EACH_LANE _Pragma("GCC ivdep") _Pragma("GCC unroll 1")
@@ -542,12 +543,12 @@ typedef struct {
     poisson_not_hamiltonian_lanes coef[1][2], weight[1][32][3];
 } poisson_not_hamiltonian_table;
 
-/* A stage in all lanes, linear around y: a residual r of alpha(y) = x takes inverse r from y and gain r from the
+/* A stage in all lanes, linearised around y: a residual r of alpha(y) = x takes inverse r from y and gain r from the
    increment. */
 typedef struct {
     poisson_not_hamiltonian_lanes y[3], displacement[3], increment[3], residual[3];
     poisson_not_hamiltonian_lanes inverse[9], slope[9], gain[9];
-} poisson_not_hamiltonian_lines;
+} poisson_not_hamiltonian_model;
 
 /* exp(u) for the loops over lanes: u = k log 2 + r, no branches. Infinite beyond |u| = 700.0. */
 static inline double poisson_not_hamiltonian_exp_lane(double u)
@@ -885,15 +886,15 @@ static void poisson_not_hamiltonian_invert_lanes(poisson_not_hamiltonian_lanes m
 }
 
 /* Everything about a stage at the points y. The matrices are I + O(h): where a pivot is far from 1, all is infinite. */
-static void poisson_not_hamiltonian_tabulate(poisson_not_hamiltonian_lanes coef[restrict], poisson_not_hamiltonian_lines *line)
+static void poisson_not_hamiltonian_tabulate(poisson_not_hamiltonian_lanes coef[restrict], poisson_not_hamiltonian_model *model)
 {
     poisson_not_hamiltonian_lanes jacobian[9], reciprocal[3];
-    poisson_not_hamiltonian_linearise_lanes(coef, line->y, line->displacement, line->increment, jacobian, line->slope);
-    poisson_not_hamiltonian_invert_lanes(jacobian, line->slope, line->inverse, line->gain, reciprocal);
+    poisson_not_hamiltonian_linearise_lanes(coef, model->y, model->displacement, model->increment, jacobian, model->slope);
+    poisson_not_hamiltonian_invert_lanes(jacobian, model->slope, model->inverse, model->gain, reciprocal);
     for (int i = 0; i < 3; ++i) {
         poisson_not_hamiltonian_EACH_LANE
         for (int lane = 0; lane < poisson_not_hamiltonian_LANES; ++lane)
-            line->inverse[i][lane] += fabs(reciprocal[i][lane]) < 1e3 ? 0.0 : HUGE_VAL;
+            model->inverse[i][lane] += fabs(reciprocal[i][lane]) < 1e3 ? 0.0 : HUGE_VAL;
     }
 }
 
@@ -914,7 +915,7 @@ static void poisson_not_hamiltonian_sizes(poisson_not_hamiltonian_lanes y[restri
 }
 
 /* Correct y by the residuals, with the inverse in the table, and measure the corrections. */
-static void poisson_not_hamiltonian_correct(poisson_not_hamiltonian_lines *line, poisson_not_hamiltonian_lanes size)
+static void poisson_not_hamiltonian_correct(poisson_not_hamiltonian_model *model, poisson_not_hamiltonian_lanes size)
 {
     poisson_not_hamiltonian_lanes delta[3];
     memset(delta, 0, sizeof delta);
@@ -922,15 +923,15 @@ static void poisson_not_hamiltonian_correct(poisson_not_hamiltonian_lines *line,
         for (int j = 0; j < 3; ++j) {
             poisson_not_hamiltonian_EACH_LANE
             for (int lane = 0; lane < poisson_not_hamiltonian_LANES; ++lane)
-                delta[i][lane] += line->inverse[i * 3 + j][lane] * line->residual[j][lane];
+                delta[i][lane] += model->inverse[i * 3 + j][lane] * model->residual[j][lane];
         }
-    poisson_not_hamiltonian_sizes(line->y, delta, size);
+    poisson_not_hamiltonian_sizes(model->y, delta, size);
     for (int i = 0; i < 3; ++i)
-        for (int lane = 0; lane < poisson_not_hamiltonian_LANES; ++lane) line->y[i][lane] -= delta[i][lane];
+        for (int lane = 0; lane < poisson_not_hamiltonian_LANES; ++lane) model->y[i][lane] -= delta[i][lane];
 }
 
-/* The largest of the lanes, which are not negative; infinite if one is not finite. As integers, the bits of numbers that are not negative have their
-   order, and those of what is no number are larger. */
+/* The largest of the lanes, none of which is negative; infinite if one is not finite. As integers, the bits of such
+   numbers have their order, and those of what is no number are larger. */
 static double poisson_not_hamiltonian_largest(const poisson_not_hamiltonian_lanes size)
 {
     uint64_t bits[8], most = 0;
@@ -963,27 +964,27 @@ static double poisson_not_hamiltonian_remaining(double size, double bend, double
 }
 
 /* The table of a stage, with its matrices or with those of the last pass. */
-static void poisson_not_hamiltonian_update(poisson_not_hamiltonian_lanes coef[restrict], poisson_not_hamiltonian_lines *line, int matrices)
+static void poisson_not_hamiltonian_update(poisson_not_hamiltonian_lanes coef[restrict], poisson_not_hamiltonian_model *model, int matrices)
 {
     if (matrices)
-        poisson_not_hamiltonian_tabulate(coef, line);
+        poisson_not_hamiltonian_tabulate(coef, model);
     else
-        poisson_not_hamiltonian_evaluate_lanes(coef, line->y, line->displacement, line->increment);
+        poisson_not_hamiltonian_evaluate_lanes(coef, model->y, model->displacement, model->increment);
 }
 
-/* The steps of a block one after the other, each along the lines of its lane. As X, the state with its carry, gains
+/* The steps of a block one after the other, each along the linear model of its lane. As X, the state with its carry, gains
    increment - gain residual, the next residual follows from this one; X itself is added up apart. */
-static void poisson_not_hamiltonian_chain(poisson_not_hamiltonian_lines line[1], double x[3], double carry[3])
+static void poisson_not_hamiltonian_chain(poisson_not_hamiltonian_model model[1], double x[3], double carry[3])
 {
     double residual[3], sum[3], small[3];
     for (int i = 0; i < 3; ++i) {
-        residual[i] = ((line->y[i][0] - x[i]) + line->displacement[i][0]) - carry[i];
+        residual[i] = ((model->y[i][0] - x[i]) + model->displacement[i][0]) - carry[i];
         sum[i] = x[i];
         small[i] = carry[i];
     }
     for (int k = 0; k < 1 * poisson_not_hamiltonian_LANES; ++k) {
         const int lane = k / 1, after = (k + 1) / 1 % poisson_not_hamiltonian_LANES;
-        poisson_not_hamiltonian_lines *at = &line[k % 1], *next = &line[(k + 1) % 1];
+        poisson_not_hamiltonian_model *at = &model[k % 1], *next = &model[(k + 1) % 1];
         double even[3] = { 0.0 }, odd[3] = { 0.0 }; /* two sums, so that no long chain of additions is waited for */
         for (int i = 0; i < 3; ++i) {
             at->residual[i][lane] = residual[i];
@@ -1005,8 +1006,8 @@ static void poisson_not_hamiltonian_chain(poisson_not_hamiltonian_lines line[1],
     }
 }
 
-/* Bring the table up to date. */
-static void poisson_not_hamiltonian_tell(const poisson_not_hamiltonian_solver *s, poisson_not_hamiltonian_table *table)
+/* Bring the table up to date: coefficients, and weights that were fitted since. */
+static void poisson_not_hamiltonian_refresh(const poisson_not_hamiltonian_solver *s, poisson_not_hamiltonian_table *table)
 {
     for (int stage = 0; stage < 1; ++stage) {
         if (table->fits[stage] == s->memory[stage].fits) continue;
@@ -1037,7 +1038,7 @@ static void poisson_not_hamiltonian_foresee(const poisson_not_hamiltonian_memory
 
 /* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
    method, to leading order. */
-static void poisson_not_hamiltonian_march(const poisson_not_hamiltonian_solver *s, poisson_not_hamiltonian_table *table, poisson_not_hamiltonian_lines line[1])
+static void poisson_not_hamiltonian_march(const poisson_not_hamiltonian_solver *s, poisson_not_hamiltonian_table *table, poisson_not_hamiltonian_model model[1])
 {
     static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
     double x[3], point[3], slope[3], mean[3];
@@ -1054,12 +1055,12 @@ static void poisson_not_hamiltonian_march(const poisson_not_hamiltonian_solver *
             }
         }
         for (int i = 0; i < 3; ++i) {
-            line[k % 1].y[i][k / 1] = x[i] + 0.5 * h * mean[i];
+            model[k % 1].y[i][k / 1] = x[i] + 0.5 * h * mean[i];
             x[i] += h * mean[i];
         }
     }
     for (int stage = 0; stage < 1; ++stage) {
-        poisson_not_hamiltonian_lines *at = &line[stage];
+        poisson_not_hamiltonian_model *at = &model[stage];
         poisson_not_hamiltonian_evaluate_lanes(table->coef[stage], at->y, at->displacement, at->increment);
         for (int i = 0; i < 3; ++i) {
             poisson_not_hamiltonian_EACH_LANE
@@ -1073,24 +1074,24 @@ static void poisson_not_hamiltonian_march(const poisson_not_hamiltonian_solver *
    small as after a single step. How many passes that took; 0, and the solver as before, where it takes more than most. */
 static int poisson_not_hamiltonian_block(poisson_not_hamiltonian_solver *s, poisson_not_hamiltonian_table *table, int most)
 {
-    poisson_not_hamiltonian_lines line[1];
+    poisson_not_hamiltonian_model model[1];
     poisson_not_hamiltonian_lanes sizes;
     double x[3], carry[3], value[3], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
-    if (!s->foreseeing) poisson_not_hamiltonian_march(s, table, line);
+    if (!s->foreseeing) poisson_not_hamiltonian_march(s, table, model);
     for (int stage = 0; stage < 1; ++stage) {
-        if (s->foreseeing) poisson_not_hamiltonian_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
-        if (!poisson_not_hamiltonian_near_lanes(line[stage].y, s->x)) return 0;
+        if (s->foreseeing) poisson_not_hamiltonian_foresee(&s->memory[stage], table->weight[stage], model[stage].y);
+        if (!poisson_not_hamiltonian_near_lanes(model[stage].y, s->x)) return 0;
     }
     while (!solved) {
         double size = 0.0;
         const int matrices = previous > 1e-05;
-        for (int stage = 0; stage < 1; ++stage) poisson_not_hamiltonian_update(table->coef[stage], &line[stage], matrices);
+        for (int stage = 0; stage < 1; ++stage) poisson_not_hamiltonian_update(table->coef[stage], &model[stage], matrices);
         memcpy(x, s->x, sizeof x);
         memcpy(carry, s->carry, sizeof carry);
-        poisson_not_hamiltonian_chain(line, x, carry);
+        poisson_not_hamiltonian_chain(model, x, carry);
         for (int stage = 0; stage < 1; ++stage) {
-            poisson_not_hamiltonian_correct(&line[stage], sizes);
+            poisson_not_hamiltonian_correct(&model[stage], sizes);
             const double largest = poisson_not_hamiltonian_largest(sizes);
             size = largest > size ? largest : size;
         }
@@ -1110,7 +1111,7 @@ static int poisson_not_hamiltonian_block(poisson_not_hamiltonian_solver *s, pois
     for (int stage = 0; stage < 1; ++stage) {
         poisson_not_hamiltonian_memory *memory = &s->memory[stage];
         for (int lane = 0; lane < poisson_not_hamiltonian_LANES; ++lane) {
-            for (int i = 0; i < 3; ++i) value[i] = line[stage].y[i][lane];
+            for (int i = 0; i < 3; ++i) value[i] = model[stage].y[i][lane];
             poisson_not_hamiltonian_record(memory, value);
         }
         memory->slow = passes > 1 ? memory->slow + poisson_not_hamiltonian_LANES : 0;
@@ -1172,7 +1173,7 @@ poisson_not_hamiltonian_status poisson_not_hamiltonian_integrate(poisson_not_ham
     while (status == poisson_not_hamiltonian_OK && steps > 0) {
         if (steps >= poisson_not_hamiltonian_LANES && s->pause == 0) poisson_not_hamiltonian_choose_guess(s, steps);
         if (steps >= poisson_not_hamiltonian_LANES && s->pause == 0) {
-            poisson_not_hamiltonian_tell(s, &table);
+            poisson_not_hamiltonian_refresh(s, &table);
             const int passes = poisson_not_hamiltonian_block(s, &table, (int)(2 * s->effort + 0.5));
             poisson_not_hamiltonian_learn_from(s, passes);
             if (passes > 0) steps -= poisson_not_hamiltonian_LANES;
@@ -1332,24 +1333,24 @@ static void poisson_not_hamiltonian_group_predict(poisson_not_hamiltonian_group 
 
 /* Newton's method for a stage, until the slowest lane is solved. The number of iterations; where that is the most
    allowed, lanes that are not solved leave the group. */
-static int poisson_not_hamiltonian_group_solve(poisson_not_hamiltonian_group *group, int stage, poisson_not_hamiltonian_lines *line)
+static int poisson_not_hamiltonian_group_solve(poisson_not_hamiltonian_group *group, int stage, poisson_not_hamiltonian_model *model)
 {
     poisson_not_hamiltonian_lanes size, previous, bound;
     double largest = HUGE_VAL, bend = 0.0;
     int iterations = 0, open = 1;
     for (int lane = 0; lane < poisson_not_hamiltonian_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
-    poisson_not_hamiltonian_group_predict(group, stage, line->y);
+    poisson_not_hamiltonian_group_predict(group, stage, model->y);
     for (; open > 0 && iterations < 20; ++iterations) {
         memcpy(previous, size, sizeof size);
-        poisson_not_hamiltonian_update(group->coef[stage], line, largest > 1e-05);
+        poisson_not_hamiltonian_update(group->coef[stage], model, largest > 1e-05);
         bend = largest > 1e-05 ? 0.0 : bend + largest;
         for (int i = 0; i < 3; ++i) {
             poisson_not_hamiltonian_EACH_LANE
             for (int lane = 0; lane < poisson_not_hamiltonian_LANES; ++lane)
-                line->residual[i][lane] =
-                    ((line->y[i][lane] - group->x[i][lane]) + line->displacement[i][lane]) - group->carry[i][lane];
+                model->residual[i][lane] =
+                    ((model->y[i][lane] - group->x[i][lane]) + model->displacement[i][lane]) - group->carry[i][lane];
         }
-        poisson_not_hamiltonian_correct(line, size);
+        poisson_not_hamiltonian_correct(model, size);
         open = poisson_not_hamiltonian_group_open(group, size, previous, bend, bound);
         largest = poisson_not_hamiltonian_largest(size);
     }
@@ -1360,18 +1361,18 @@ static int poisson_not_hamiltonian_group_solve(poisson_not_hamiltonian_group *gr
 
 /* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
 static void poisson_not_hamiltonian_group_advance(poisson_not_hamiltonian_lanes x[restrict 3], poisson_not_hamiltonian_lanes carry[restrict 3],
-    poisson_not_hamiltonian_lines *line)
+    poisson_not_hamiltonian_model *model)
 {
     for (int i = 0; i < 3; ++i)
         for (int j = 0; j < 3; ++j) {
             poisson_not_hamiltonian_EACH_LANE
             for (int lane = 0; lane < poisson_not_hamiltonian_LANES; ++lane)
-                carry[i][lane] -= line->gain[i * 3 + j][lane] * line->residual[j][lane];
+                carry[i][lane] -= model->gain[i * 3 + j][lane] * model->residual[j][lane];
         }
     for (int i = 0; i < 3; ++i) {
         poisson_not_hamiltonian_EACH_LANE
         for (int lane = 0; lane < poisson_not_hamiltonian_LANES; ++lane) {
-            const double change = line->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
+            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
             const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
             x[i][lane] = sum + small;
             carry[i][lane] = small - (x[i][lane] - sum);
@@ -1383,17 +1384,17 @@ static void poisson_not_hamiltonian_group_advance(poisson_not_hamiltonian_lanes 
 static int poisson_not_hamiltonian_group_step(poisson_not_hamiltonian_group *group, size_t remaining)
 {
     poisson_not_hamiltonian_lanes x[3], carry[3];
-    poisson_not_hamiltonian_lines line;
+    poisson_not_hamiltonian_model model;
     const int next = (group->latest + 96 - 1) % 96;
     int active = 0, most = 0;
     memcpy(x, group->x, sizeof x);
     memcpy(carry, group->carry, sizeof carry);
     for (int stage = 0; stage < 1; ++stage) {
-        const int iterations = poisson_not_hamiltonian_group_solve(group, stage, &line);
-        poisson_not_hamiltonian_group_advance(group->x, group->carry, &line);
-        if (next % 8 == 0 || group->count < 8) poisson_not_hamiltonian_group_judge(group, stage, line.y);
+        const int iterations = poisson_not_hamiltonian_group_solve(group, stage, &model);
+        poisson_not_hamiltonian_group_advance(group->x, group->carry, &model);
+        if (next % 8 == 0 || group->count < 8) poisson_not_hamiltonian_group_judge(group, stage, model.y);
         if (iterations > most) most = iterations;
-        memcpy(group->past[stage][next], line.y, sizeof line.y);
+        memcpy(group->past[stage][next], model.y, sizeof model.y);
     }
     group->latest = next;
     if (group->count < 96) ++group->count;
@@ -1491,6 +1492,10 @@ poisson_not_hamiltonian_status poisson_not_hamiltonian_ensemble(const poisson_no
     }
     return worst;
 }
+
+#if defined(__clang__)
+#pragma clang diagnostic pop
+#endif
 
 /* the Hamiltonian */
 static void poisson_not_hamiltonian_energy(const poisson_not_hamiltonian_params *params, const double x[3],

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 487f4e70cd07ef68185c5123a37eb139bdd2687eaf6f47806b9924e07786e744
+ * body-sha256: 655aad3d5d6dd4ab6e1141c9acb4080a787272b1f8e03a0e170332739aacbedb
  */
 #ifndef POISSON_NOT_HAMILTONIAN_H
 #define POISSON_NOT_HAMILTONIAN_H
@@ -71,7 +71,7 @@ typedef struct {
     int pause;      /* steps to make singly before a block is tried */
     int setback;    /* the last pause, halved with every block that succeeds */
     int foreseeing; /* whether blocks are guessed by recurrences */
-    int passes;     /* that the last block took which was not */
+    int passes;     /* that the last block took which was guessed by Runge-Kutta steps */
     size_t doubt;   /* steps to wait before recurrences are tried again */
     size_t retry;   /* steps after which that is */
     double coef[1][2]; /* what depends on params and h only, for each stage */

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 5083a7e229039c5ddc4140384555346e0c7058fd39757e6825ebe57171a99f9f
+ * body-sha256: 456551e81aedbbba93bd94298ad48ba12abe4ef7b10325fe5e6163874154dd01
  */
 #include "predator_prey.h"
 
@@ -425,6 +425,7 @@ typedef double predator_prey_lanes[predator_prey_LANES];
 
 #if defined(__clang__)
 #define predator_prey_EACH_LANE _Pragma("clang loop vectorize(assume_safety)")
+#pragma clang diagnostic push
 #pragma clang diagnostic ignored "-Wpass-failed"
 #elif defined(__GNUC__)
 #define predator_prey_EACH_LANE _Pragma("GCC ivdep") _Pragma("GCC unroll 1")
@@ -438,12 +439,12 @@ typedef struct {
     predator_prey_lanes coef[1][11], weight[1][32][2];
 } predator_prey_table;
 
-/* A stage in all lanes, linear around y: a residual r of alpha(y) = x takes inverse r from y and gain r from the
+/* A stage in all lanes, linearised around y: a residual r of alpha(y) = x takes inverse r from y and gain r from the
    increment. */
 typedef struct {
     predator_prey_lanes y[2], displacement[2], increment[2], residual[2];
     predator_prey_lanes inverse[4], slope[4], gain[4];
-} predator_prey_lines;
+} predator_prey_model;
 
 /* exp(u) - 1 for the loops over lanes: u = k log 2 + r, no branches. Infinite beyond |u| = 700.0. */
 static inline double predator_prey_expm1_lane(double u)
@@ -577,15 +578,15 @@ static void predator_prey_invert_lanes(predator_prey_lanes matrix[restrict 4],
 }
 
 /* Everything about a stage at the points y. The matrices are I + O(h): where a pivot is far from 1, all is infinite. */
-static void predator_prey_tabulate(predator_prey_lanes coef[restrict], predator_prey_lines *line)
+static void predator_prey_tabulate(predator_prey_lanes coef[restrict], predator_prey_model *model)
 {
     predator_prey_lanes jacobian[4], reciprocal[2];
-    predator_prey_linearise_lanes(coef, line->y, line->displacement, line->increment, jacobian, line->slope);
-    predator_prey_invert_lanes(jacobian, line->slope, line->inverse, line->gain, reciprocal);
+    predator_prey_linearise_lanes(coef, model->y, model->displacement, model->increment, jacobian, model->slope);
+    predator_prey_invert_lanes(jacobian, model->slope, model->inverse, model->gain, reciprocal);
     for (int i = 0; i < 2; ++i) {
         predator_prey_EACH_LANE
         for (int lane = 0; lane < predator_prey_LANES; ++lane)
-            line->inverse[i][lane] += fabs(reciprocal[i][lane]) < 1e3 ? 0.0 : HUGE_VAL;
+            model->inverse[i][lane] += fabs(reciprocal[i][lane]) < 1e3 ? 0.0 : HUGE_VAL;
     }
 }
 
@@ -606,7 +607,7 @@ static void predator_prey_sizes(predator_prey_lanes y[restrict 2], predator_prey
 }
 
 /* Correct y by the residuals, with the inverse in the table, and measure the corrections. */
-static void predator_prey_correct(predator_prey_lines *line, predator_prey_lanes size)
+static void predator_prey_correct(predator_prey_model *model, predator_prey_lanes size)
 {
     predator_prey_lanes delta[2];
     memset(delta, 0, sizeof delta);
@@ -614,15 +615,15 @@ static void predator_prey_correct(predator_prey_lines *line, predator_prey_lanes
         for (int j = 0; j < 2; ++j) {
             predator_prey_EACH_LANE
             for (int lane = 0; lane < predator_prey_LANES; ++lane)
-                delta[i][lane] += line->inverse[i * 2 + j][lane] * line->residual[j][lane];
+                delta[i][lane] += model->inverse[i * 2 + j][lane] * model->residual[j][lane];
         }
-    predator_prey_sizes(line->y, delta, size);
+    predator_prey_sizes(model->y, delta, size);
     for (int i = 0; i < 2; ++i)
-        for (int lane = 0; lane < predator_prey_LANES; ++lane) line->y[i][lane] -= delta[i][lane];
+        for (int lane = 0; lane < predator_prey_LANES; ++lane) model->y[i][lane] -= delta[i][lane];
 }
 
-/* The largest of the lanes, which are not negative; infinite if one is not finite. As integers, the bits of numbers that are not negative have their
-   order, and those of what is no number are larger. */
+/* The largest of the lanes, none of which is negative; infinite if one is not finite. As integers, the bits of such
+   numbers have their order, and those of what is no number are larger. */
 static double predator_prey_largest(const predator_prey_lanes size)
 {
     uint64_t bits[8], most = 0;
@@ -655,27 +656,27 @@ static double predator_prey_remaining(double size, double bend, double bound)
 }
 
 /* The table of a stage, with its matrices or with those of the last pass. */
-static void predator_prey_update(predator_prey_lanes coef[restrict], predator_prey_lines *line, int matrices)
+static void predator_prey_update(predator_prey_lanes coef[restrict], predator_prey_model *model, int matrices)
 {
     if (matrices)
-        predator_prey_tabulate(coef, line);
+        predator_prey_tabulate(coef, model);
     else
-        predator_prey_evaluate_lanes(coef, line->y, line->displacement, line->increment);
+        predator_prey_evaluate_lanes(coef, model->y, model->displacement, model->increment);
 }
 
-/* The steps of a block one after the other, each along the lines of its lane. As X, the state with its carry, gains
+/* The steps of a block one after the other, each along the linear model of its lane. As X, the state with its carry, gains
    increment - gain residual, the next residual follows from this one; X itself is added up apart. */
-static void predator_prey_chain(predator_prey_lines line[1], double x[2], double carry[2])
+static void predator_prey_chain(predator_prey_model model[1], double x[2], double carry[2])
 {
     double residual[2], sum[2], small[2];
     for (int i = 0; i < 2; ++i) {
-        residual[i] = ((line->y[i][0] - x[i]) + line->displacement[i][0]) - carry[i];
+        residual[i] = ((model->y[i][0] - x[i]) + model->displacement[i][0]) - carry[i];
         sum[i] = x[i];
         small[i] = carry[i];
     }
     for (int k = 0; k < 1 * predator_prey_LANES; ++k) {
         const int lane = k / 1, after = (k + 1) / 1 % predator_prey_LANES;
-        predator_prey_lines *at = &line[k % 1], *next = &line[(k + 1) % 1];
+        predator_prey_model *at = &model[k % 1], *next = &model[(k + 1) % 1];
         double even[2] = { 0.0 }, odd[2] = { 0.0 }; /* two sums, so that no long chain of additions is waited for */
         for (int i = 0; i < 2; ++i) {
             at->residual[i][lane] = residual[i];
@@ -697,8 +698,8 @@ static void predator_prey_chain(predator_prey_lines line[1], double x[2], double
     }
 }
 
-/* Bring the table up to date. */
-static void predator_prey_tell(const predator_prey_solver *s, predator_prey_table *table)
+/* Bring the table up to date: coefficients, and weights that were fitted since. */
+static void predator_prey_refresh(const predator_prey_solver *s, predator_prey_table *table)
 {
     for (int stage = 0; stage < 1; ++stage) {
         if (table->fits[stage] == s->memory[stage].fits) continue;
@@ -729,7 +730,7 @@ static void predator_prey_foresee(const predator_prey_memory *memory, predator_p
 
 /* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
    method, to leading order. */
-static void predator_prey_march(const predator_prey_solver *s, predator_prey_table *table, predator_prey_lines line[1])
+static void predator_prey_march(const predator_prey_solver *s, predator_prey_table *table, predator_prey_model model[1])
 {
     static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
     double x[2], point[2], slope[2], mean[2];
@@ -746,12 +747,12 @@ static void predator_prey_march(const predator_prey_solver *s, predator_prey_tab
             }
         }
         for (int i = 0; i < 2; ++i) {
-            line[k % 1].y[i][k / 1] = x[i] + 0.5 * h * mean[i];
+            model[k % 1].y[i][k / 1] = x[i] + 0.5 * h * mean[i];
             x[i] += h * mean[i];
         }
     }
     for (int stage = 0; stage < 1; ++stage) {
-        predator_prey_lines *at = &line[stage];
+        predator_prey_model *at = &model[stage];
         predator_prey_evaluate_lanes(table->coef[stage], at->y, at->displacement, at->increment);
         for (int i = 0; i < 2; ++i) {
             predator_prey_EACH_LANE
@@ -765,24 +766,24 @@ static void predator_prey_march(const predator_prey_solver *s, predator_prey_tab
    small as after a single step. How many passes that took; 0, and the solver as before, where it takes more than most. */
 static int predator_prey_block(predator_prey_solver *s, predator_prey_table *table, int most)
 {
-    predator_prey_lines line[1];
+    predator_prey_model model[1];
     predator_prey_lanes sizes;
     double x[2], carry[2], value[2], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
-    if (!s->foreseeing) predator_prey_march(s, table, line);
+    if (!s->foreseeing) predator_prey_march(s, table, model);
     for (int stage = 0; stage < 1; ++stage) {
-        if (s->foreseeing) predator_prey_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
-        if (!predator_prey_near_lanes(line[stage].y, s->x)) return 0;
+        if (s->foreseeing) predator_prey_foresee(&s->memory[stage], table->weight[stage], model[stage].y);
+        if (!predator_prey_near_lanes(model[stage].y, s->x)) return 0;
     }
     while (!solved) {
         double size = 0.0;
         const int matrices = previous > 1e-05;
-        for (int stage = 0; stage < 1; ++stage) predator_prey_update(table->coef[stage], &line[stage], matrices);
+        for (int stage = 0; stage < 1; ++stage) predator_prey_update(table->coef[stage], &model[stage], matrices);
         memcpy(x, s->x, sizeof x);
         memcpy(carry, s->carry, sizeof carry);
-        predator_prey_chain(line, x, carry);
+        predator_prey_chain(model, x, carry);
         for (int stage = 0; stage < 1; ++stage) {
-            predator_prey_correct(&line[stage], sizes);
+            predator_prey_correct(&model[stage], sizes);
             const double largest = predator_prey_largest(sizes);
             size = largest > size ? largest : size;
         }
@@ -802,7 +803,7 @@ static int predator_prey_block(predator_prey_solver *s, predator_prey_table *tab
     for (int stage = 0; stage < 1; ++stage) {
         predator_prey_memory *memory = &s->memory[stage];
         for (int lane = 0; lane < predator_prey_LANES; ++lane) {
-            for (int i = 0; i < 2; ++i) value[i] = line[stage].y[i][lane];
+            for (int i = 0; i < 2; ++i) value[i] = model[stage].y[i][lane];
             predator_prey_record(memory, value);
         }
         memory->slow = passes > 1 ? memory->slow + predator_prey_LANES : 0;
@@ -864,7 +865,7 @@ predator_prey_status predator_prey_integrate(predator_prey_solver *s, double h, 
     while (status == predator_prey_OK && steps > 0) {
         if (steps >= predator_prey_LANES && s->pause == 0) predator_prey_choose_guess(s, steps);
         if (steps >= predator_prey_LANES && s->pause == 0) {
-            predator_prey_tell(s, &table);
+            predator_prey_refresh(s, &table);
             const int passes = predator_prey_block(s, &table, (int)(2 * s->effort + 0.5));
             predator_prey_learn_from(s, passes);
             if (passes > 0) steps -= predator_prey_LANES;
@@ -1024,24 +1025,24 @@ static void predator_prey_group_predict(predator_prey_group *group, int stage, p
 
 /* Newton's method for a stage, until the slowest lane is solved. The number of iterations; where that is the most
    allowed, lanes that are not solved leave the group. */
-static int predator_prey_group_solve(predator_prey_group *group, int stage, predator_prey_lines *line)
+static int predator_prey_group_solve(predator_prey_group *group, int stage, predator_prey_model *model)
 {
     predator_prey_lanes size, previous, bound;
     double largest = HUGE_VAL, bend = 0.0;
     int iterations = 0, open = 1;
     for (int lane = 0; lane < predator_prey_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
-    predator_prey_group_predict(group, stage, line->y);
+    predator_prey_group_predict(group, stage, model->y);
     for (; open > 0 && iterations < 20; ++iterations) {
         memcpy(previous, size, sizeof size);
-        predator_prey_update(group->coef[stage], line, largest > 1e-05);
+        predator_prey_update(group->coef[stage], model, largest > 1e-05);
         bend = largest > 1e-05 ? 0.0 : bend + largest;
         for (int i = 0; i < 2; ++i) {
             predator_prey_EACH_LANE
             for (int lane = 0; lane < predator_prey_LANES; ++lane)
-                line->residual[i][lane] =
-                    ((line->y[i][lane] - group->x[i][lane]) + line->displacement[i][lane]) - group->carry[i][lane];
+                model->residual[i][lane] =
+                    ((model->y[i][lane] - group->x[i][lane]) + model->displacement[i][lane]) - group->carry[i][lane];
         }
-        predator_prey_correct(line, size);
+        predator_prey_correct(model, size);
         open = predator_prey_group_open(group, size, previous, bend, bound);
         largest = predator_prey_largest(size);
     }
@@ -1052,18 +1053,18 @@ static int predator_prey_group_solve(predator_prey_group *group, int stage, pred
 
 /* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
 static void predator_prey_group_advance(predator_prey_lanes x[restrict 2], predator_prey_lanes carry[restrict 2],
-    predator_prey_lines *line)
+    predator_prey_model *model)
 {
     for (int i = 0; i < 2; ++i)
         for (int j = 0; j < 2; ++j) {
             predator_prey_EACH_LANE
             for (int lane = 0; lane < predator_prey_LANES; ++lane)
-                carry[i][lane] -= line->gain[i * 2 + j][lane] * line->residual[j][lane];
+                carry[i][lane] -= model->gain[i * 2 + j][lane] * model->residual[j][lane];
         }
     for (int i = 0; i < 2; ++i) {
         predator_prey_EACH_LANE
         for (int lane = 0; lane < predator_prey_LANES; ++lane) {
-            const double change = line->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
+            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
             const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
             x[i][lane] = sum + small;
             carry[i][lane] = small - (x[i][lane] - sum);
@@ -1075,17 +1076,17 @@ static void predator_prey_group_advance(predator_prey_lanes x[restrict 2], preda
 static int predator_prey_group_step(predator_prey_group *group, size_t remaining)
 {
     predator_prey_lanes x[2], carry[2];
-    predator_prey_lines line;
+    predator_prey_model model;
     const int next = (group->latest + 96 - 1) % 96;
     int active = 0, most = 0;
     memcpy(x, group->x, sizeof x);
     memcpy(carry, group->carry, sizeof carry);
     for (int stage = 0; stage < 1; ++stage) {
-        const int iterations = predator_prey_group_solve(group, stage, &line);
-        predator_prey_group_advance(group->x, group->carry, &line);
-        if (next % 8 == 0 || group->count < 8) predator_prey_group_judge(group, stage, line.y);
+        const int iterations = predator_prey_group_solve(group, stage, &model);
+        predator_prey_group_advance(group->x, group->carry, &model);
+        if (next % 8 == 0 || group->count < 8) predator_prey_group_judge(group, stage, model.y);
         if (iterations > most) most = iterations;
-        memcpy(group->past[stage][next], line.y, sizeof line.y);
+        memcpy(group->past[stage][next], model.y, sizeof model.y);
     }
     group->latest = next;
     if (group->count < 96) ++group->count;
@@ -1182,6 +1183,10 @@ predator_prey_status predator_prey_ensemble(const predator_prey_params *params, 
     }
     return worst;
 }
+
+#if defined(__clang__)
+#pragma clang diagnostic pop
+#endif
 
 /* the Hamiltonian */
 static void predator_prey_energy(const predator_prey_params *params, const double x[2],

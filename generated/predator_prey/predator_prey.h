@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 86f1a0c83522ed445be9a51611bfd281f3329f5928e1327ca45aeeb1ff7de6cc
+ * body-sha256: efdd124fa42aa30df7cf4ce13fdb11abbed1f6783a7c9479e6fdea545d83dae7
  */
 #ifndef PREDATOR_PREY_H
 #define PREDATOR_PREY_H
@@ -74,7 +74,7 @@ typedef struct {
     int pause;      /* steps to make singly before a block is tried */
     int setback;    /* the last pause, halved with every block that succeeds */
     int foreseeing; /* whether blocks are guessed by recurrences */
-    int passes;     /* that the last block took which was not */
+    int passes;     /* that the last block took which was guessed by Runge-Kutta steps */
     size_t doubt;   /* steps to wait before recurrences are tried again */
     size_t retry;   /* steps after which that is */
     double coef[1][11]; /* what depends on params and h only, for each stage */

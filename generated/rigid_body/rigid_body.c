@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 478505556a821b2502fbb911fb80ef059bb5f1f95d1c71b58335c2785614e020
+ * body-sha256: ba391a85fe0b4000af049ce1dcf1ff6b7b6058b078f18667478d20a2fd25bd02
  */
 #include "rigid_body.h"
 
@@ -829,6 +829,7 @@ typedef double rigid_body_lanes[rigid_body_LANES];
 
 #if defined(__clang__)
 #define rigid_body_EACH_LANE _Pragma("clang loop vectorize(assume_safety)")
+#pragma clang diagnostic push
 #pragma clang diagnostic ignored "-Wpass-failed"
 #elif defined(__GNUC__)
 #define rigid_body_EACH_LANE _Pragma("GCC ivdep") _Pragma("GCC unroll 1")
@@ -842,12 +843,12 @@ typedef struct {
     rigid_body_lanes coef[1][35], weight[1][32][3];
 } rigid_body_table;
 
-/* A stage in all lanes, linear around y: a residual r of alpha(y) = x takes inverse r from y and gain r from the
+/* A stage in all lanes, linearised around y: a residual r of alpha(y) = x takes inverse r from y and gain r from the
    increment. */
 typedef struct {
     rigid_body_lanes y[3], displacement[3], increment[3], residual[3];
     rigid_body_lanes inverse[9], slope[9], gain[9];
-} rigid_body_lines;
+} rigid_body_model;
 
 /* rigid_body_phi0 for the loops over lanes: no branches. Infinite beyond |s| = 4.0. */
 static inline double rigid_body_phi0_lane(double s)
@@ -1079,15 +1080,15 @@ static void rigid_body_invert_lanes(rigid_body_lanes matrix[restrict 9], rigid_b
 }
 
 /* Everything about a stage at the points y. The matrices are I + O(h): where a pivot is far from 1, all is infinite. */
-static void rigid_body_tabulate(rigid_body_lanes coef[restrict], rigid_body_lines *line)
+static void rigid_body_tabulate(rigid_body_lanes coef[restrict], rigid_body_model *model)
 {
     rigid_body_lanes jacobian[9], reciprocal[3];
-    rigid_body_linearise_lanes(coef, line->y, line->displacement, line->increment, jacobian, line->slope);
-    rigid_body_invert_lanes(jacobian, line->slope, line->inverse, line->gain, reciprocal);
+    rigid_body_linearise_lanes(coef, model->y, model->displacement, model->increment, jacobian, model->slope);
+    rigid_body_invert_lanes(jacobian, model->slope, model->inverse, model->gain, reciprocal);
     for (int i = 0; i < 3; ++i) {
         rigid_body_EACH_LANE
         for (int lane = 0; lane < rigid_body_LANES; ++lane)
-            line->inverse[i][lane] += fabs(reciprocal[i][lane]) < 1e3 ? 0.0 : HUGE_VAL;
+            model->inverse[i][lane] += fabs(reciprocal[i][lane]) < 1e3 ? 0.0 : HUGE_VAL;
     }
 }
 
@@ -1108,7 +1109,7 @@ static void rigid_body_sizes(rigid_body_lanes y[restrict 3], rigid_body_lanes de
 }
 
 /* Correct y by the residuals, with the inverse in the table, and measure the corrections. */
-static void rigid_body_correct(rigid_body_lines *line, rigid_body_lanes size)
+static void rigid_body_correct(rigid_body_model *model, rigid_body_lanes size)
 {
     rigid_body_lanes delta[3];
     memset(delta, 0, sizeof delta);
@@ -1116,15 +1117,15 @@ static void rigid_body_correct(rigid_body_lines *line, rigid_body_lanes size)
         for (int j = 0; j < 3; ++j) {
             rigid_body_EACH_LANE
             for (int lane = 0; lane < rigid_body_LANES; ++lane)
-                delta[i][lane] += line->inverse[i * 3 + j][lane] * line->residual[j][lane];
+                delta[i][lane] += model->inverse[i * 3 + j][lane] * model->residual[j][lane];
         }
-    rigid_body_sizes(line->y, delta, size);
+    rigid_body_sizes(model->y, delta, size);
     for (int i = 0; i < 3; ++i)
-        for (int lane = 0; lane < rigid_body_LANES; ++lane) line->y[i][lane] -= delta[i][lane];
+        for (int lane = 0; lane < rigid_body_LANES; ++lane) model->y[i][lane] -= delta[i][lane];
 }
 
-/* The largest of the lanes, which are not negative; infinite if one is not finite. As integers, the bits of numbers that are not negative have their
-   order, and those of what is no number are larger. */
+/* The largest of the lanes, none of which is negative; infinite if one is not finite. As integers, the bits of such
+   numbers have their order, and those of what is no number are larger. */
 static double rigid_body_largest(const rigid_body_lanes size)
 {
     uint64_t bits[8], most = 0;
@@ -1157,27 +1158,27 @@ static double rigid_body_remaining(double size, double bend, double bound)
 }
 
 /* The table of a stage, with its matrices or with those of the last pass. */
-static void rigid_body_update(rigid_body_lanes coef[restrict], rigid_body_lines *line, int matrices)
+static void rigid_body_update(rigid_body_lanes coef[restrict], rigid_body_model *model, int matrices)
 {
     if (matrices)
-        rigid_body_tabulate(coef, line);
+        rigid_body_tabulate(coef, model);
     else
-        rigid_body_evaluate_lanes(coef, line->y, line->displacement, line->increment);
+        rigid_body_evaluate_lanes(coef, model->y, model->displacement, model->increment);
 }
 
-/* The steps of a block one after the other, each along the lines of its lane. As X, the state with its carry, gains
+/* The steps of a block one after the other, each along the linear model of its lane. As X, the state with its carry, gains
    increment - gain residual, the next residual follows from this one; X itself is added up apart. */
-static void rigid_body_chain(rigid_body_lines line[1], double x[3], double carry[3])
+static void rigid_body_chain(rigid_body_model model[1], double x[3], double carry[3])
 {
     double residual[3], sum[3], small[3];
     for (int i = 0; i < 3; ++i) {
-        residual[i] = ((line->y[i][0] - x[i]) + line->displacement[i][0]) - carry[i];
+        residual[i] = ((model->y[i][0] - x[i]) + model->displacement[i][0]) - carry[i];
         sum[i] = x[i];
         small[i] = carry[i];
     }
     for (int k = 0; k < 1 * rigid_body_LANES; ++k) {
         const int lane = k / 1, after = (k + 1) / 1 % rigid_body_LANES;
-        rigid_body_lines *at = &line[k % 1], *next = &line[(k + 1) % 1];
+        rigid_body_model *at = &model[k % 1], *next = &model[(k + 1) % 1];
         double even[3] = { 0.0 }, odd[3] = { 0.0 }; /* two sums, so that no long chain of additions is waited for */
         for (int i = 0; i < 3; ++i) {
             at->residual[i][lane] = residual[i];
@@ -1199,8 +1200,8 @@ static void rigid_body_chain(rigid_body_lines line[1], double x[3], double carry
     }
 }
 
-/* Bring the table up to date. */
-static void rigid_body_tell(const rigid_body_solver *s, rigid_body_table *table)
+/* Bring the table up to date: coefficients, and weights that were fitted since. */
+static void rigid_body_refresh(const rigid_body_solver *s, rigid_body_table *table)
 {
     for (int stage = 0; stage < 1; ++stage) {
         if (table->fits[stage] == s->memory[stage].fits) continue;
@@ -1231,7 +1232,7 @@ static void rigid_body_foresee(const rigid_body_memory *memory, rigid_body_lanes
 
 /* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
    method, to leading order. */
-static void rigid_body_march(const rigid_body_solver *s, rigid_body_table *table, rigid_body_lines line[1])
+static void rigid_body_march(const rigid_body_solver *s, rigid_body_table *table, rigid_body_model model[1])
 {
     static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
     double x[3], point[3], slope[3], mean[3];
@@ -1248,12 +1249,12 @@ static void rigid_body_march(const rigid_body_solver *s, rigid_body_table *table
             }
         }
         for (int i = 0; i < 3; ++i) {
-            line[k % 1].y[i][k / 1] = x[i] + 0.5 * h * mean[i];
+            model[k % 1].y[i][k / 1] = x[i] + 0.5 * h * mean[i];
             x[i] += h * mean[i];
         }
     }
     for (int stage = 0; stage < 1; ++stage) {
-        rigid_body_lines *at = &line[stage];
+        rigid_body_model *at = &model[stage];
         rigid_body_evaluate_lanes(table->coef[stage], at->y, at->displacement, at->increment);
         for (int i = 0; i < 3; ++i) {
             rigid_body_EACH_LANE
@@ -1267,24 +1268,24 @@ static void rigid_body_march(const rigid_body_solver *s, rigid_body_table *table
    small as after a single step. How many passes that took; 0, and the solver as before, where it takes more than most. */
 static int rigid_body_block(rigid_body_solver *s, rigid_body_table *table, int most)
 {
-    rigid_body_lines line[1];
+    rigid_body_model model[1];
     rigid_body_lanes sizes;
     double x[3], carry[3], value[3], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
-    if (!s->foreseeing) rigid_body_march(s, table, line);
+    if (!s->foreseeing) rigid_body_march(s, table, model);
     for (int stage = 0; stage < 1; ++stage) {
-        if (s->foreseeing) rigid_body_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
-        if (!rigid_body_near_lanes(line[stage].y, s->x)) return 0;
+        if (s->foreseeing) rigid_body_foresee(&s->memory[stage], table->weight[stage], model[stage].y);
+        if (!rigid_body_near_lanes(model[stage].y, s->x)) return 0;
     }
     while (!solved) {
         double size = 0.0;
         const int matrices = previous > 1e-05;
-        for (int stage = 0; stage < 1; ++stage) rigid_body_update(table->coef[stage], &line[stage], matrices);
+        for (int stage = 0; stage < 1; ++stage) rigid_body_update(table->coef[stage], &model[stage], matrices);
         memcpy(x, s->x, sizeof x);
         memcpy(carry, s->carry, sizeof carry);
-        rigid_body_chain(line, x, carry);
+        rigid_body_chain(model, x, carry);
         for (int stage = 0; stage < 1; ++stage) {
-            rigid_body_correct(&line[stage], sizes);
+            rigid_body_correct(&model[stage], sizes);
             const double largest = rigid_body_largest(sizes);
             size = largest > size ? largest : size;
         }
@@ -1304,7 +1305,7 @@ static int rigid_body_block(rigid_body_solver *s, rigid_body_table *table, int m
     for (int stage = 0; stage < 1; ++stage) {
         rigid_body_memory *memory = &s->memory[stage];
         for (int lane = 0; lane < rigid_body_LANES; ++lane) {
-            for (int i = 0; i < 3; ++i) value[i] = line[stage].y[i][lane];
+            for (int i = 0; i < 3; ++i) value[i] = model[stage].y[i][lane];
             rigid_body_record(memory, value);
         }
         memory->slow = passes > 1 ? memory->slow + rigid_body_LANES : 0;
@@ -1366,7 +1367,7 @@ rigid_body_status rigid_body_integrate(rigid_body_solver *s, double h, size_t st
     while (status == rigid_body_OK && steps > 0) {
         if (steps >= rigid_body_LANES && s->pause == 0) rigid_body_choose_guess(s, steps);
         if (steps >= rigid_body_LANES && s->pause == 0) {
-            rigid_body_tell(s, &table);
+            rigid_body_refresh(s, &table);
             const int passes = rigid_body_block(s, &table, (int)(2 * s->effort + 0.5));
             rigid_body_learn_from(s, passes);
             if (passes > 0) steps -= rigid_body_LANES;
@@ -1527,24 +1528,24 @@ static void rigid_body_group_predict(rigid_body_group *group, int stage, rigid_b
 
 /* Newton's method for a stage, until the slowest lane is solved. The number of iterations; where that is the most
    allowed, lanes that are not solved leave the group. */
-static int rigid_body_group_solve(rigid_body_group *group, int stage, rigid_body_lines *line)
+static int rigid_body_group_solve(rigid_body_group *group, int stage, rigid_body_model *model)
 {
     rigid_body_lanes size, previous, bound;
     double largest = HUGE_VAL, bend = 0.0;
     int iterations = 0, open = 1;
     for (int lane = 0; lane < rigid_body_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
-    rigid_body_group_predict(group, stage, line->y);
+    rigid_body_group_predict(group, stage, model->y);
     for (; open > 0 && iterations < 20; ++iterations) {
         memcpy(previous, size, sizeof size);
-        rigid_body_update(group->coef[stage], line, largest > 1e-05);
+        rigid_body_update(group->coef[stage], model, largest > 1e-05);
         bend = largest > 1e-05 ? 0.0 : bend + largest;
         for (int i = 0; i < 3; ++i) {
             rigid_body_EACH_LANE
             for (int lane = 0; lane < rigid_body_LANES; ++lane)
-                line->residual[i][lane] =
-                    ((line->y[i][lane] - group->x[i][lane]) + line->displacement[i][lane]) - group->carry[i][lane];
+                model->residual[i][lane] =
+                    ((model->y[i][lane] - group->x[i][lane]) + model->displacement[i][lane]) - group->carry[i][lane];
         }
-        rigid_body_correct(line, size);
+        rigid_body_correct(model, size);
         open = rigid_body_group_open(group, size, previous, bend, bound);
         largest = rigid_body_largest(size);
     }
@@ -1555,18 +1556,18 @@ static int rigid_body_group_solve(rigid_body_group *group, int stage, rigid_body
 
 /* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
 static void rigid_body_group_advance(rigid_body_lanes x[restrict 3], rigid_body_lanes carry[restrict 3],
-    rigid_body_lines *line)
+    rigid_body_model *model)
 {
     for (int i = 0; i < 3; ++i)
         for (int j = 0; j < 3; ++j) {
             rigid_body_EACH_LANE
             for (int lane = 0; lane < rigid_body_LANES; ++lane)
-                carry[i][lane] -= line->gain[i * 3 + j][lane] * line->residual[j][lane];
+                carry[i][lane] -= model->gain[i * 3 + j][lane] * model->residual[j][lane];
         }
     for (int i = 0; i < 3; ++i) {
         rigid_body_EACH_LANE
         for (int lane = 0; lane < rigid_body_LANES; ++lane) {
-            const double change = line->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
+            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
             const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
             x[i][lane] = sum + small;
             carry[i][lane] = small - (x[i][lane] - sum);
@@ -1578,17 +1579,17 @@ static void rigid_body_group_advance(rigid_body_lanes x[restrict 3], rigid_body_
 static int rigid_body_group_step(rigid_body_group *group, size_t remaining)
 {
     rigid_body_lanes x[3], carry[3];
-    rigid_body_lines line;
+    rigid_body_model model;
     const int next = (group->latest + 96 - 1) % 96;
     int active = 0, most = 0;
     memcpy(x, group->x, sizeof x);
     memcpy(carry, group->carry, sizeof carry);
     for (int stage = 0; stage < 1; ++stage) {
-        const int iterations = rigid_body_group_solve(group, stage, &line);
-        rigid_body_group_advance(group->x, group->carry, &line);
-        if (next % 8 == 0 || group->count < 8) rigid_body_group_judge(group, stage, line.y);
+        const int iterations = rigid_body_group_solve(group, stage, &model);
+        rigid_body_group_advance(group->x, group->carry, &model);
+        if (next % 8 == 0 || group->count < 8) rigid_body_group_judge(group, stage, model.y);
         if (iterations > most) most = iterations;
-        memcpy(group->past[stage][next], line.y, sizeof line.y);
+        memcpy(group->past[stage][next], model.y, sizeof model.y);
     }
     group->latest = next;
     if (group->count < 96) ++group->count;
@@ -1686,6 +1687,10 @@ rigid_body_status rigid_body_ensemble(const rigid_body_params *params, double *x
     }
     return worst;
 }
+
+#if defined(__clang__)
+#pragma clang diagnostic pop
+#endif
 
 /* the Hamiltonian */
 static void rigid_body_energy(const rigid_body_params *params, const double x[3], double energy[restrict 1])

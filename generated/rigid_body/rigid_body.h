@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: f99861b3bac9b1b355d17d52825c94a7429890f6f774526a0c30829ff5285d99
+ * body-sha256: 60e8f555e890895cf44b7d83524728479bb7e84ea16591d8c6c3952911ac6682
  */
 #ifndef RIGID_BODY_H
 #define RIGID_BODY_H
@@ -75,7 +75,7 @@ typedef struct {
     int pause;      /* steps to make singly before a block is tried */
     int setback;    /* the last pause, halved with every block that succeeds */
     int foreseeing; /* whether blocks are guessed by recurrences */
-    int passes;     /* that the last block took which was not */
+    int passes;     /* that the last block took which was guessed by Runge-Kutta steps */
     size_t doubt;   /* steps to wait before recurrences are tried again */
     size_t retry;   /* steps after which that is */
     double coef[1][35]; /* what depends on params and h only, for each stage */

@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 1e4373647c5bf58593d928beaaa3869974df0c2789aa2d94c3c4d2051a7929ee
+ * body-sha256: 8f2a6df2fa6c7496a2fb984eef8d5fc1deed6a8a6478a8b3cda30250f7429ae1
  */
 #include "rigid_body_dual.h"
 
@@ -723,6 +723,7 @@ typedef double rigid_body_dual_lanes[rigid_body_dual_LANES];
 
 #if defined(__clang__)
 #define rigid_body_dual_EACH_LANE _Pragma("clang loop vectorize(assume_safety)")
+#pragma clang diagnostic push
 #pragma clang diagnostic ignored "-Wpass-failed"
 #elif defined(__GNUC__)
 #define rigid_body_dual_EACH_LANE _Pragma("GCC ivdep") _Pragma("GCC unroll 1")
@@ -736,12 +737,12 @@ typedef struct {
     rigid_body_dual_lanes coef[1][12], weight[1][32][3];
 } rigid_body_dual_table;
 
-/* A stage in all lanes, linear around y: a residual r of alpha(y) = x takes inverse r from y and gain r from the
+/* A stage in all lanes, linearised around y: a residual r of alpha(y) = x takes inverse r from y and gain r from the
    increment. */
 typedef struct {
     rigid_body_dual_lanes y[3], displacement[3], increment[3], residual[3];
     rigid_body_dual_lanes inverse[9], slope[9], gain[9];
-} rigid_body_dual_lines;
+} rigid_body_dual_model;
 
 /* rigid_body_dual_phi0 for the loops over lanes: no branches. Infinite beyond |s| = 4.0. */
 static inline double rigid_body_dual_phi0_lane(double s)
@@ -979,15 +980,15 @@ static void rigid_body_dual_invert_lanes(rigid_body_dual_lanes matrix[restrict 9
 }
 
 /* Everything about a stage at the points y. The matrices are I + O(h): where a pivot is far from 1, all is infinite. */
-static void rigid_body_dual_tabulate(rigid_body_dual_lanes coef[restrict], rigid_body_dual_lines *line)
+static void rigid_body_dual_tabulate(rigid_body_dual_lanes coef[restrict], rigid_body_dual_model *model)
 {
     rigid_body_dual_lanes jacobian[9], reciprocal[3];
-    rigid_body_dual_linearise_lanes(coef, line->y, line->displacement, line->increment, jacobian, line->slope);
-    rigid_body_dual_invert_lanes(jacobian, line->slope, line->inverse, line->gain, reciprocal);
+    rigid_body_dual_linearise_lanes(coef, model->y, model->displacement, model->increment, jacobian, model->slope);
+    rigid_body_dual_invert_lanes(jacobian, model->slope, model->inverse, model->gain, reciprocal);
     for (int i = 0; i < 3; ++i) {
         rigid_body_dual_EACH_LANE
         for (int lane = 0; lane < rigid_body_dual_LANES; ++lane)
-            line->inverse[i][lane] += fabs(reciprocal[i][lane]) < 1e3 ? 0.0 : HUGE_VAL;
+            model->inverse[i][lane] += fabs(reciprocal[i][lane]) < 1e3 ? 0.0 : HUGE_VAL;
     }
 }
 
@@ -1008,7 +1009,7 @@ static void rigid_body_dual_sizes(rigid_body_dual_lanes y[restrict 3], rigid_bod
 }
 
 /* Correct y by the residuals, with the inverse in the table, and measure the corrections. */
-static void rigid_body_dual_correct(rigid_body_dual_lines *line, rigid_body_dual_lanes size)
+static void rigid_body_dual_correct(rigid_body_dual_model *model, rigid_body_dual_lanes size)
 {
     rigid_body_dual_lanes delta[3];
     memset(delta, 0, sizeof delta);
@@ -1016,15 +1017,15 @@ static void rigid_body_dual_correct(rigid_body_dual_lines *line, rigid_body_dual
         for (int j = 0; j < 3; ++j) {
             rigid_body_dual_EACH_LANE
             for (int lane = 0; lane < rigid_body_dual_LANES; ++lane)
-                delta[i][lane] += line->inverse[i * 3 + j][lane] * line->residual[j][lane];
+                delta[i][lane] += model->inverse[i * 3 + j][lane] * model->residual[j][lane];
         }
-    rigid_body_dual_sizes(line->y, delta, size);
+    rigid_body_dual_sizes(model->y, delta, size);
     for (int i = 0; i < 3; ++i)
-        for (int lane = 0; lane < rigid_body_dual_LANES; ++lane) line->y[i][lane] -= delta[i][lane];
+        for (int lane = 0; lane < rigid_body_dual_LANES; ++lane) model->y[i][lane] -= delta[i][lane];
 }
 
-/* The largest of the lanes, which are not negative; infinite if one is not finite. As integers, the bits of numbers that are not negative have their
-   order, and those of what is no number are larger. */
+/* The largest of the lanes, none of which is negative; infinite if one is not finite. As integers, the bits of such
+   numbers have their order, and those of what is no number are larger. */
 static double rigid_body_dual_largest(const rigid_body_dual_lanes size)
 {
     uint64_t bits[8], most = 0;
@@ -1057,27 +1058,27 @@ static double rigid_body_dual_remaining(double size, double bend, double bound)
 }
 
 /* The table of a stage, with its matrices or with those of the last pass. */
-static void rigid_body_dual_update(rigid_body_dual_lanes coef[restrict], rigid_body_dual_lines *line, int matrices)
+static void rigid_body_dual_update(rigid_body_dual_lanes coef[restrict], rigid_body_dual_model *model, int matrices)
 {
     if (matrices)
-        rigid_body_dual_tabulate(coef, line);
+        rigid_body_dual_tabulate(coef, model);
     else
-        rigid_body_dual_evaluate_lanes(coef, line->y, line->displacement, line->increment);
+        rigid_body_dual_evaluate_lanes(coef, model->y, model->displacement, model->increment);
 }
 
-/* The steps of a block one after the other, each along the lines of its lane. As X, the state with its carry, gains
+/* The steps of a block one after the other, each along the linear model of its lane. As X, the state with its carry, gains
    increment - gain residual, the next residual follows from this one; X itself is added up apart. */
-static void rigid_body_dual_chain(rigid_body_dual_lines line[1], double x[3], double carry[3])
+static void rigid_body_dual_chain(rigid_body_dual_model model[1], double x[3], double carry[3])
 {
     double residual[3], sum[3], small[3];
     for (int i = 0; i < 3; ++i) {
-        residual[i] = ((line->y[i][0] - x[i]) + line->displacement[i][0]) - carry[i];
+        residual[i] = ((model->y[i][0] - x[i]) + model->displacement[i][0]) - carry[i];
         sum[i] = x[i];
         small[i] = carry[i];
     }
     for (int k = 0; k < 1 * rigid_body_dual_LANES; ++k) {
         const int lane = k / 1, after = (k + 1) / 1 % rigid_body_dual_LANES;
-        rigid_body_dual_lines *at = &line[k % 1], *next = &line[(k + 1) % 1];
+        rigid_body_dual_model *at = &model[k % 1], *next = &model[(k + 1) % 1];
         double even[3] = { 0.0 }, odd[3] = { 0.0 }; /* two sums, so that no long chain of additions is waited for */
         for (int i = 0; i < 3; ++i) {
             at->residual[i][lane] = residual[i];
@@ -1099,8 +1100,8 @@ static void rigid_body_dual_chain(rigid_body_dual_lines line[1], double x[3], do
     }
 }
 
-/* Bring the table up to date. */
-static void rigid_body_dual_tell(const rigid_body_dual_solver *s, rigid_body_dual_table *table)
+/* Bring the table up to date: coefficients, and weights that were fitted since. */
+static void rigid_body_dual_refresh(const rigid_body_dual_solver *s, rigid_body_dual_table *table)
 {
     for (int stage = 0; stage < 1; ++stage) {
         if (table->fits[stage] == s->memory[stage].fits) continue;
@@ -1131,7 +1132,7 @@ static void rigid_body_dual_foresee(const rigid_body_dual_memory *memory, rigid_
 
 /* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
    method, to leading order. */
-static void rigid_body_dual_march(const rigid_body_dual_solver *s, rigid_body_dual_table *table, rigid_body_dual_lines line[1])
+static void rigid_body_dual_march(const rigid_body_dual_solver *s, rigid_body_dual_table *table, rigid_body_dual_model model[1])
 {
     static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
     double x[3], point[3], slope[3], mean[3];
@@ -1148,12 +1149,12 @@ static void rigid_body_dual_march(const rigid_body_dual_solver *s, rigid_body_du
             }
         }
         for (int i = 0; i < 3; ++i) {
-            line[k % 1].y[i][k / 1] = x[i] + 0.5 * h * mean[i];
+            model[k % 1].y[i][k / 1] = x[i] + 0.5 * h * mean[i];
             x[i] += h * mean[i];
         }
     }
     for (int stage = 0; stage < 1; ++stage) {
-        rigid_body_dual_lines *at = &line[stage];
+        rigid_body_dual_model *at = &model[stage];
         rigid_body_dual_evaluate_lanes(table->coef[stage], at->y, at->displacement, at->increment);
         for (int i = 0; i < 3; ++i) {
             rigid_body_dual_EACH_LANE
@@ -1167,24 +1168,24 @@ static void rigid_body_dual_march(const rigid_body_dual_solver *s, rigid_body_du
    small as after a single step. How many passes that took; 0, and the solver as before, where it takes more than most. */
 static int rigid_body_dual_block(rigid_body_dual_solver *s, rigid_body_dual_table *table, int most)
 {
-    rigid_body_dual_lines line[1];
+    rigid_body_dual_model model[1];
     rigid_body_dual_lanes sizes;
     double x[3], carry[3], value[3], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
-    if (!s->foreseeing) rigid_body_dual_march(s, table, line);
+    if (!s->foreseeing) rigid_body_dual_march(s, table, model);
     for (int stage = 0; stage < 1; ++stage) {
-        if (s->foreseeing) rigid_body_dual_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
-        if (!rigid_body_dual_near_lanes(line[stage].y, s->x)) return 0;
+        if (s->foreseeing) rigid_body_dual_foresee(&s->memory[stage], table->weight[stage], model[stage].y);
+        if (!rigid_body_dual_near_lanes(model[stage].y, s->x)) return 0;
     }
     while (!solved) {
         double size = 0.0;
         const int matrices = previous > 1e-05;
-        for (int stage = 0; stage < 1; ++stage) rigid_body_dual_update(table->coef[stage], &line[stage], matrices);
+        for (int stage = 0; stage < 1; ++stage) rigid_body_dual_update(table->coef[stage], &model[stage], matrices);
         memcpy(x, s->x, sizeof x);
         memcpy(carry, s->carry, sizeof carry);
-        rigid_body_dual_chain(line, x, carry);
+        rigid_body_dual_chain(model, x, carry);
         for (int stage = 0; stage < 1; ++stage) {
-            rigid_body_dual_correct(&line[stage], sizes);
+            rigid_body_dual_correct(&model[stage], sizes);
             const double largest = rigid_body_dual_largest(sizes);
             size = largest > size ? largest : size;
         }
@@ -1204,7 +1205,7 @@ static int rigid_body_dual_block(rigid_body_dual_solver *s, rigid_body_dual_tabl
     for (int stage = 0; stage < 1; ++stage) {
         rigid_body_dual_memory *memory = &s->memory[stage];
         for (int lane = 0; lane < rigid_body_dual_LANES; ++lane) {
-            for (int i = 0; i < 3; ++i) value[i] = line[stage].y[i][lane];
+            for (int i = 0; i < 3; ++i) value[i] = model[stage].y[i][lane];
             rigid_body_dual_record(memory, value);
         }
         memory->slow = passes > 1 ? memory->slow + rigid_body_dual_LANES : 0;
@@ -1266,7 +1267,7 @@ rigid_body_dual_status rigid_body_dual_integrate(rigid_body_dual_solver *s, doub
     while (status == rigid_body_dual_OK && steps > 0) {
         if (steps >= rigid_body_dual_LANES && s->pause == 0) rigid_body_dual_choose_guess(s, steps);
         if (steps >= rigid_body_dual_LANES && s->pause == 0) {
-            rigid_body_dual_tell(s, &table);
+            rigid_body_dual_refresh(s, &table);
             const int passes = rigid_body_dual_block(s, &table, (int)(2 * s->effort + 0.5));
             rigid_body_dual_learn_from(s, passes);
             if (passes > 0) steps -= rigid_body_dual_LANES;
@@ -1427,24 +1428,24 @@ static void rigid_body_dual_group_predict(rigid_body_dual_group *group, int stag
 
 /* Newton's method for a stage, until the slowest lane is solved. The number of iterations; where that is the most
    allowed, lanes that are not solved leave the group. */
-static int rigid_body_dual_group_solve(rigid_body_dual_group *group, int stage, rigid_body_dual_lines *line)
+static int rigid_body_dual_group_solve(rigid_body_dual_group *group, int stage, rigid_body_dual_model *model)
 {
     rigid_body_dual_lanes size, previous, bound;
     double largest = HUGE_VAL, bend = 0.0;
     int iterations = 0, open = 1;
     for (int lane = 0; lane < rigid_body_dual_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
-    rigid_body_dual_group_predict(group, stage, line->y);
+    rigid_body_dual_group_predict(group, stage, model->y);
     for (; open > 0 && iterations < 20; ++iterations) {
         memcpy(previous, size, sizeof size);
-        rigid_body_dual_update(group->coef[stage], line, largest > 1e-05);
+        rigid_body_dual_update(group->coef[stage], model, largest > 1e-05);
         bend = largest > 1e-05 ? 0.0 : bend + largest;
         for (int i = 0; i < 3; ++i) {
             rigid_body_dual_EACH_LANE
             for (int lane = 0; lane < rigid_body_dual_LANES; ++lane)
-                line->residual[i][lane] =
-                    ((line->y[i][lane] - group->x[i][lane]) + line->displacement[i][lane]) - group->carry[i][lane];
+                model->residual[i][lane] =
+                    ((model->y[i][lane] - group->x[i][lane]) + model->displacement[i][lane]) - group->carry[i][lane];
         }
-        rigid_body_dual_correct(line, size);
+        rigid_body_dual_correct(model, size);
         open = rigid_body_dual_group_open(group, size, previous, bend, bound);
         largest = rigid_body_dual_largest(size);
     }
@@ -1455,18 +1456,18 @@ static int rigid_body_dual_group_solve(rigid_body_dual_group *group, int stage, 
 
 /* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
 static void rigid_body_dual_group_advance(rigid_body_dual_lanes x[restrict 3], rigid_body_dual_lanes carry[restrict 3],
-    rigid_body_dual_lines *line)
+    rigid_body_dual_model *model)
 {
     for (int i = 0; i < 3; ++i)
         for (int j = 0; j < 3; ++j) {
             rigid_body_dual_EACH_LANE
             for (int lane = 0; lane < rigid_body_dual_LANES; ++lane)
-                carry[i][lane] -= line->gain[i * 3 + j][lane] * line->residual[j][lane];
+                carry[i][lane] -= model->gain[i * 3 + j][lane] * model->residual[j][lane];
         }
     for (int i = 0; i < 3; ++i) {
         rigid_body_dual_EACH_LANE
         for (int lane = 0; lane < rigid_body_dual_LANES; ++lane) {
-            const double change = line->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
+            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
             const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
             x[i][lane] = sum + small;
             carry[i][lane] = small - (x[i][lane] - sum);
@@ -1478,17 +1479,17 @@ static void rigid_body_dual_group_advance(rigid_body_dual_lanes x[restrict 3], r
 static int rigid_body_dual_group_step(rigid_body_dual_group *group, size_t remaining)
 {
     rigid_body_dual_lanes x[3], carry[3];
-    rigid_body_dual_lines line;
+    rigid_body_dual_model model;
     const int next = (group->latest + 96 - 1) % 96;
     int active = 0, most = 0;
     memcpy(x, group->x, sizeof x);
     memcpy(carry, group->carry, sizeof carry);
     for (int stage = 0; stage < 1; ++stage) {
-        const int iterations = rigid_body_dual_group_solve(group, stage, &line);
-        rigid_body_dual_group_advance(group->x, group->carry, &line);
-        if (next % 8 == 0 || group->count < 8) rigid_body_dual_group_judge(group, stage, line.y);
+        const int iterations = rigid_body_dual_group_solve(group, stage, &model);
+        rigid_body_dual_group_advance(group->x, group->carry, &model);
+        if (next % 8 == 0 || group->count < 8) rigid_body_dual_group_judge(group, stage, model.y);
         if (iterations > most) most = iterations;
-        memcpy(group->past[stage][next], line.y, sizeof line.y);
+        memcpy(group->past[stage][next], model.y, sizeof model.y);
     }
     group->latest = next;
     if (group->count < 96) ++group->count;
@@ -1586,6 +1587,10 @@ rigid_body_dual_status rigid_body_dual_ensemble(const rigid_body_dual_params *pa
     }
     return worst;
 }
+
+#if defined(__clang__)
+#pragma clang diagnostic pop
+#endif
 
 /* the Hamiltonian */
 static void rigid_body_dual_energy(const rigid_body_dual_params *params, const double x[3],

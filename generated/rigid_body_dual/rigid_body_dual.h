@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 4454c6d98e8a12aa71f8183dab1b7249b5237fa13acb2d094bb6338801dc2f34
+ * body-sha256: 0c85476568fa2d2e9d9fafd688fe78f7c5514d45ba741a29728bdb1470311bfb
  */
 #ifndef RIGID_BODY_DUAL_H
 #define RIGID_BODY_DUAL_H
@@ -75,7 +75,7 @@ typedef struct {
     int pause;      /* steps to make singly before a block is tried */
     int setback;    /* the last pause, halved with every block that succeeds */
     int foreseeing; /* whether blocks are guessed by recurrences */
-    int passes;     /* that the last block took which was not */
+    int passes;     /* that the last block took which was guessed by Runge-Kutta steps */
     size_t doubt;   /* steps to wait before recurrences are tried again */
     size_t retry;   /* steps after which that is */
     double coef[1][12]; /* what depends on params and h only, for each stage */

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 14e1923da833e8c716ce9a072b9aec571d9e9d73b6429137b50609fd388a9db0
+ * body-sha256: 098062b4d35ef3e3bb00c78e731d9188714a2b1ed0a11d15dc0b36a9954f8791
  */
 #ifndef RIGID_BODY_PAPER_H
 #define RIGID_BODY_PAPER_H
@@ -73,7 +73,7 @@ typedef struct {
     int pause;      /* steps to make singly before a block is tried */
     int setback;    /* the last pause, halved with every block that succeeds */
     int foreseeing; /* whether blocks are guessed by recurrences */
-    int passes;     /* that the last block took which was not */
+    int passes;     /* that the last block took which was guessed by Runge-Kutta steps */
     size_t doubt;   /* steps to wait before recurrences are tried again */
     size_t retry;   /* steps after which that is */
     double coef[1][3]; /* what depends on params and h only, for each stage */

@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: e32b299b156d4a8ff241831791180df79eb3c23b3082809865fe385a33088f40
+ * body-sha256: 3e6c665545e3086d4addc7e7ec6396ff97aa1ab93dd7b7aa641f88779a80eb47
  */
 #include "so4_manakov.h"
 
@@ -1148,6 +1148,7 @@ typedef double so4_manakov_lanes[so4_manakov_LANES];
 
 #if defined(__clang__)
 #define so4_manakov_EACH_LANE _Pragma("clang loop vectorize(assume_safety)")
+#pragma clang diagnostic push
 #pragma clang diagnostic ignored "-Wpass-failed"
 #elif defined(__GNUC__)
 #define so4_manakov_EACH_LANE _Pragma("GCC ivdep") _Pragma("GCC unroll 1")
@@ -1161,12 +1162,12 @@ typedef struct {
     so4_manakov_lanes coef[1][32], weight[1][32][6];
 } so4_manakov_table;
 
-/* A stage in all lanes, linear around y: a residual r of alpha(y) = x takes inverse r from y and gain r from the
+/* A stage in all lanes, linearised around y: a residual r of alpha(y) = x takes inverse r from y and gain r from the
    increment. */
 typedef struct {
     so4_manakov_lanes y[6], displacement[6], increment[6], residual[6];
     so4_manakov_lanes inverse[36], slope[36], gain[36];
-} so4_manakov_lines;
+} so4_manakov_model;
 
 /* so4_manakov_phi0 for the loops over lanes: no branches. Infinite beyond |s| = 4.0. */
 static inline double so4_manakov_phi0_lane(double s)
@@ -1880,19 +1881,19 @@ static void so4_manakov_invert(so4_manakov_lanes matrix[restrict 36])
 }
 
 /* Everything about a stage at the points y. */
-static void so4_manakov_tabulate(so4_manakov_lanes coef[restrict], so4_manakov_lines *line)
+static void so4_manakov_tabulate(so4_manakov_lanes coef[restrict], so4_manakov_model *model)
 {
-    so4_manakov_linearise_lanes(coef, line->y, line->displacement, line->increment, line->inverse, line->slope);
-    so4_manakov_invert(line->inverse);
+    so4_manakov_linearise_lanes(coef, model->y, model->displacement, model->increment, model->inverse, model->slope);
+    so4_manakov_invert(model->inverse);
     for (int i = 0; i < 6; ++i)
         for (int j = 0; j < 6; ++j) {
             so4_manakov_lanes sum = { 0.0 };
             for (int k = 0; k < 6; ++k) {
                 so4_manakov_EACH_LANE
                 for (int lane = 0; lane < so4_manakov_LANES; ++lane)
-                    sum[lane] += line->slope[i * 6 + k][lane] * line->inverse[k * 6 + j][lane];
+                    sum[lane] += model->slope[i * 6 + k][lane] * model->inverse[k * 6 + j][lane];
             }
-            memcpy(line->gain[i * 6 + j], sum, sizeof sum);
+            memcpy(model->gain[i * 6 + j], sum, sizeof sum);
         }
 }
 
@@ -1913,7 +1914,7 @@ static void so4_manakov_sizes(so4_manakov_lanes y[restrict 6], so4_manakov_lanes
 }
 
 /* Correct y by the residuals, with the inverse in the table, and measure the corrections. */
-static void so4_manakov_correct(so4_manakov_lines *line, so4_manakov_lanes size)
+static void so4_manakov_correct(so4_manakov_model *model, so4_manakov_lanes size)
 {
     so4_manakov_lanes delta[6];
     memset(delta, 0, sizeof delta);
@@ -1921,15 +1922,15 @@ static void so4_manakov_correct(so4_manakov_lines *line, so4_manakov_lanes size)
         for (int j = 0; j < 6; ++j) {
             so4_manakov_EACH_LANE
             for (int lane = 0; lane < so4_manakov_LANES; ++lane)
-                delta[i][lane] += line->inverse[i * 6 + j][lane] * line->residual[j][lane];
+                delta[i][lane] += model->inverse[i * 6 + j][lane] * model->residual[j][lane];
         }
-    so4_manakov_sizes(line->y, delta, size);
+    so4_manakov_sizes(model->y, delta, size);
     for (int i = 0; i < 6; ++i)
-        for (int lane = 0; lane < so4_manakov_LANES; ++lane) line->y[i][lane] -= delta[i][lane];
+        for (int lane = 0; lane < so4_manakov_LANES; ++lane) model->y[i][lane] -= delta[i][lane];
 }
 
-/* The largest of the lanes, which are not negative; infinite if one is not finite. As integers, the bits of numbers that are not negative have their
-   order, and those of what is no number are larger. */
+/* The largest of the lanes, none of which is negative; infinite if one is not finite. As integers, the bits of such
+   numbers have their order, and those of what is no number are larger. */
 static double so4_manakov_largest(const so4_manakov_lanes size)
 {
     uint64_t bits[8], most = 0;
@@ -1962,27 +1963,27 @@ static double so4_manakov_remaining(double size, double bend, double bound)
 }
 
 /* The table of a stage, with its matrices or with those of the last pass. */
-static void so4_manakov_update(so4_manakov_lanes coef[restrict], so4_manakov_lines *line, int matrices)
+static void so4_manakov_update(so4_manakov_lanes coef[restrict], so4_manakov_model *model, int matrices)
 {
     if (matrices)
-        so4_manakov_tabulate(coef, line);
+        so4_manakov_tabulate(coef, model);
     else
-        so4_manakov_evaluate_lanes(coef, line->y, line->displacement, line->increment);
+        so4_manakov_evaluate_lanes(coef, model->y, model->displacement, model->increment);
 }
 
-/* The steps of a block one after the other, each along the lines of its lane. As X, the state with its carry, gains
+/* The steps of a block one after the other, each along the linear model of its lane. As X, the state with its carry, gains
    increment - gain residual, the next residual follows from this one; X itself is added up apart. */
-static void so4_manakov_chain(so4_manakov_lines line[1], double x[6], double carry[6])
+static void so4_manakov_chain(so4_manakov_model model[1], double x[6], double carry[6])
 {
     double residual[6], sum[6], small[6];
     for (int i = 0; i < 6; ++i) {
-        residual[i] = ((line->y[i][0] - x[i]) + line->displacement[i][0]) - carry[i];
+        residual[i] = ((model->y[i][0] - x[i]) + model->displacement[i][0]) - carry[i];
         sum[i] = x[i];
         small[i] = carry[i];
     }
     for (int k = 0; k < 1 * so4_manakov_LANES; ++k) {
         const int lane = k / 1, after = (k + 1) / 1 % so4_manakov_LANES;
-        so4_manakov_lines *at = &line[k % 1], *next = &line[(k + 1) % 1];
+        so4_manakov_model *at = &model[k % 1], *next = &model[(k + 1) % 1];
         double even[6] = { 0.0 }, odd[6] = { 0.0 }; /* two sums, so that no long chain of additions is waited for */
         for (int i = 0; i < 6; ++i) {
             at->residual[i][lane] = residual[i];
@@ -2004,8 +2005,8 @@ static void so4_manakov_chain(so4_manakov_lines line[1], double x[6], double car
     }
 }
 
-/* Bring the table up to date. */
-static void so4_manakov_tell(const so4_manakov_solver *s, so4_manakov_table *table)
+/* Bring the table up to date: coefficients, and weights that were fitted since. */
+static void so4_manakov_refresh(const so4_manakov_solver *s, so4_manakov_table *table)
 {
     for (int stage = 0; stage < 1; ++stage) {
         if (table->fits[stage] == s->memory[stage].fits) continue;
@@ -2036,7 +2037,7 @@ static void so4_manakov_foresee(const so4_manakov_memory *memory, so4_manakov_la
 
 /* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
    method, to leading order. */
-static void so4_manakov_march(const so4_manakov_solver *s, so4_manakov_table *table, so4_manakov_lines line[1])
+static void so4_manakov_march(const so4_manakov_solver *s, so4_manakov_table *table, so4_manakov_model model[1])
 {
     static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
     double x[6], point[6], slope[6], mean[6];
@@ -2053,12 +2054,12 @@ static void so4_manakov_march(const so4_manakov_solver *s, so4_manakov_table *ta
             }
         }
         for (int i = 0; i < 6; ++i) {
-            line[k % 1].y[i][k / 1] = x[i] + 0.5 * h * mean[i];
+            model[k % 1].y[i][k / 1] = x[i] + 0.5 * h * mean[i];
             x[i] += h * mean[i];
         }
     }
     for (int stage = 0; stage < 1; ++stage) {
-        so4_manakov_lines *at = &line[stage];
+        so4_manakov_model *at = &model[stage];
         so4_manakov_evaluate_lanes(table->coef[stage], at->y, at->displacement, at->increment);
         for (int i = 0; i < 6; ++i) {
             so4_manakov_EACH_LANE
@@ -2072,24 +2073,24 @@ static void so4_manakov_march(const so4_manakov_solver *s, so4_manakov_table *ta
    small as after a single step. How many passes that took; 0, and the solver as before, where it takes more than most. */
 static int so4_manakov_block(so4_manakov_solver *s, so4_manakov_table *table, int most)
 {
-    so4_manakov_lines line[1];
+    so4_manakov_model model[1];
     so4_manakov_lanes sizes;
     double x[6], carry[6], value[6], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
-    if (!s->foreseeing) so4_manakov_march(s, table, line);
+    if (!s->foreseeing) so4_manakov_march(s, table, model);
     for (int stage = 0; stage < 1; ++stage) {
-        if (s->foreseeing) so4_manakov_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
-        if (!so4_manakov_near_lanes(line[stage].y, s->x)) return 0;
+        if (s->foreseeing) so4_manakov_foresee(&s->memory[stage], table->weight[stage], model[stage].y);
+        if (!so4_manakov_near_lanes(model[stage].y, s->x)) return 0;
     }
     while (!solved) {
         double size = 0.0;
         const int matrices = previous > 1e-05;
-        for (int stage = 0; stage < 1; ++stage) so4_manakov_update(table->coef[stage], &line[stage], matrices);
+        for (int stage = 0; stage < 1; ++stage) so4_manakov_update(table->coef[stage], &model[stage], matrices);
         memcpy(x, s->x, sizeof x);
         memcpy(carry, s->carry, sizeof carry);
-        so4_manakov_chain(line, x, carry);
+        so4_manakov_chain(model, x, carry);
         for (int stage = 0; stage < 1; ++stage) {
-            so4_manakov_correct(&line[stage], sizes);
+            so4_manakov_correct(&model[stage], sizes);
             const double largest = so4_manakov_largest(sizes);
             size = largest > size ? largest : size;
         }
@@ -2109,7 +2110,7 @@ static int so4_manakov_block(so4_manakov_solver *s, so4_manakov_table *table, in
     for (int stage = 0; stage < 1; ++stage) {
         so4_manakov_memory *memory = &s->memory[stage];
         for (int lane = 0; lane < so4_manakov_LANES; ++lane) {
-            for (int i = 0; i < 6; ++i) value[i] = line[stage].y[i][lane];
+            for (int i = 0; i < 6; ++i) value[i] = model[stage].y[i][lane];
             so4_manakov_record(memory, value);
         }
         memory->slow = passes > 1 ? memory->slow + so4_manakov_LANES : 0;
@@ -2171,7 +2172,7 @@ so4_manakov_status so4_manakov_integrate(so4_manakov_solver *s, double h, size_t
     while (status == so4_manakov_OK && steps > 0) {
         if (steps >= so4_manakov_LANES && s->pause == 0) so4_manakov_choose_guess(s, steps);
         if (steps >= so4_manakov_LANES && s->pause == 0) {
-            so4_manakov_tell(s, &table);
+            so4_manakov_refresh(s, &table);
             const int passes = so4_manakov_block(s, &table, (int)(2 * s->effort + 0.5));
             so4_manakov_learn_from(s, passes);
             if (passes > 0) steps -= so4_manakov_LANES;
@@ -2332,24 +2333,24 @@ static void so4_manakov_group_predict(so4_manakov_group *group, int stage, so4_m
 
 /* Newton's method for a stage, until the slowest lane is solved. The number of iterations; where that is the most
    allowed, lanes that are not solved leave the group. */
-static int so4_manakov_group_solve(so4_manakov_group *group, int stage, so4_manakov_lines *line)
+static int so4_manakov_group_solve(so4_manakov_group *group, int stage, so4_manakov_model *model)
 {
     so4_manakov_lanes size, previous, bound;
     double largest = HUGE_VAL, bend = 0.0;
     int iterations = 0, open = 1;
     for (int lane = 0; lane < so4_manakov_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
-    so4_manakov_group_predict(group, stage, line->y);
+    so4_manakov_group_predict(group, stage, model->y);
     for (; open > 0 && iterations < 20; ++iterations) {
         memcpy(previous, size, sizeof size);
-        so4_manakov_update(group->coef[stage], line, largest > 1e-05);
+        so4_manakov_update(group->coef[stage], model, largest > 1e-05);
         bend = largest > 1e-05 ? 0.0 : bend + largest;
         for (int i = 0; i < 6; ++i) {
             so4_manakov_EACH_LANE
             for (int lane = 0; lane < so4_manakov_LANES; ++lane)
-                line->residual[i][lane] =
-                    ((line->y[i][lane] - group->x[i][lane]) + line->displacement[i][lane]) - group->carry[i][lane];
+                model->residual[i][lane] =
+                    ((model->y[i][lane] - group->x[i][lane]) + model->displacement[i][lane]) - group->carry[i][lane];
         }
-        so4_manakov_correct(line, size);
+        so4_manakov_correct(model, size);
         open = so4_manakov_group_open(group, size, previous, bend, bound);
         largest = so4_manakov_largest(size);
     }
@@ -2360,18 +2361,18 @@ static int so4_manakov_group_solve(so4_manakov_group *group, int stage, so4_mana
 
 /* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
 static void so4_manakov_group_advance(so4_manakov_lanes x[restrict 6], so4_manakov_lanes carry[restrict 6],
-    so4_manakov_lines *line)
+    so4_manakov_model *model)
 {
     for (int i = 0; i < 6; ++i)
         for (int j = 0; j < 6; ++j) {
             so4_manakov_EACH_LANE
             for (int lane = 0; lane < so4_manakov_LANES; ++lane)
-                carry[i][lane] -= line->gain[i * 6 + j][lane] * line->residual[j][lane];
+                carry[i][lane] -= model->gain[i * 6 + j][lane] * model->residual[j][lane];
         }
     for (int i = 0; i < 6; ++i) {
         so4_manakov_EACH_LANE
         for (int lane = 0; lane < so4_manakov_LANES; ++lane) {
-            const double change = line->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
+            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
             const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
             x[i][lane] = sum + small;
             carry[i][lane] = small - (x[i][lane] - sum);
@@ -2383,17 +2384,17 @@ static void so4_manakov_group_advance(so4_manakov_lanes x[restrict 6], so4_manak
 static int so4_manakov_group_step(so4_manakov_group *group, size_t remaining)
 {
     so4_manakov_lanes x[6], carry[6];
-    so4_manakov_lines line;
+    so4_manakov_model model;
     const int next = (group->latest + 96 - 1) % 96;
     int active = 0, most = 0;
     memcpy(x, group->x, sizeof x);
     memcpy(carry, group->carry, sizeof carry);
     for (int stage = 0; stage < 1; ++stage) {
-        const int iterations = so4_manakov_group_solve(group, stage, &line);
-        so4_manakov_group_advance(group->x, group->carry, &line);
-        if (next % 8 == 0 || group->count < 8) so4_manakov_group_judge(group, stage, line.y);
+        const int iterations = so4_manakov_group_solve(group, stage, &model);
+        so4_manakov_group_advance(group->x, group->carry, &model);
+        if (next % 8 == 0 || group->count < 8) so4_manakov_group_judge(group, stage, model.y);
         if (iterations > most) most = iterations;
-        memcpy(group->past[stage][next], line.y, sizeof line.y);
+        memcpy(group->past[stage][next], model.y, sizeof model.y);
     }
     group->latest = next;
     if (group->count < 96) ++group->count;
@@ -2491,6 +2492,10 @@ so4_manakov_status so4_manakov_ensemble(const so4_manakov_params *params, double
     }
     return worst;
 }
+
+#if defined(__clang__)
+#pragma clang diagnostic pop
+#endif
 
 /* the Hamiltonian */
 static void so4_manakov_energy(const so4_manakov_params *params, const double x[6], double energy[restrict 1])

@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: a5a2b81f9aa1c86f3bb412979b6f59564271515d46c5d041c3bc3a5bf803d1b0
+ * body-sha256: 98be8dc1956432adfa9f6c4c0ee6fc862b8bf808d7a79c81b92f6292c62409d6
  */
 #ifndef SO4_MANAKOV_H
 #define SO4_MANAKOV_H
@@ -73,7 +73,7 @@ typedef struct {
     int pause;      /* steps to make singly before a block is tried */
     int setback;    /* the last pause, halved with every block that succeeds */
     int foreseeing; /* whether blocks are guessed by recurrences */
-    int passes;     /* that the last block took which was not */
+    int passes;     /* that the last block took which was guessed by Runge-Kutta steps */
     size_t doubt;   /* steps to wait before recurrences are tried again */
     size_t retry;   /* steps after which that is */
     double coef[1][32]; /* what depends on params and h only, for each stage */

@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: dddb4abd38908d4ed9f242125d72de65b4bd1279bdf2ef7fa19f34517912af15
+ * body-sha256: 6d37ebff329ca64f444354836297c92d9b3961f0fbbc6a9cb97e34f6457da636
  */
 #include "spin_chain5.h"
 
@@ -2539,6 +2539,7 @@ typedef double spin_chain5_lanes[spin_chain5_LANES];
 
 #if defined(__clang__)
 #define spin_chain5_EACH_LANE _Pragma("clang loop vectorize(assume_safety)")
+#pragma clang diagnostic push
 #pragma clang diagnostic ignored "-Wpass-failed"
 #elif defined(__GNUC__)
 #define spin_chain5_EACH_LANE _Pragma("GCC ivdep") _Pragma("GCC unroll 1")
@@ -2552,12 +2553,12 @@ typedef struct {
     spin_chain5_lanes coef[1][33], weight[1][32][15];
 } spin_chain5_table;
 
-/* A stage in all lanes, linear around y: a residual r of alpha(y) = x takes inverse r from y and gain r from the
+/* A stage in all lanes, linearised around y: a residual r of alpha(y) = x takes inverse r from y and gain r from the
    increment. */
 typedef struct {
     spin_chain5_lanes y[15], displacement[15], increment[15], residual[15];
     spin_chain5_lanes inverse[225], slope[225], gain[225];
-} spin_chain5_lines;
+} spin_chain5_model;
 
 /* spin_chain5_phi0 for the loops over lanes: no branches. Infinite beyond |s| = 4.0. */
 static inline double spin_chain5_phi0_lane(double s)
@@ -4500,19 +4501,19 @@ static void spin_chain5_invert(spin_chain5_lanes matrix[restrict 225])
 }
 
 /* Everything about a stage at the points y. */
-static void spin_chain5_tabulate(spin_chain5_lanes coef[restrict], spin_chain5_lines *line)
+static void spin_chain5_tabulate(spin_chain5_lanes coef[restrict], spin_chain5_model *model)
 {
-    spin_chain5_linearise_lanes(coef, line->y, line->displacement, line->increment, line->inverse, line->slope);
-    spin_chain5_invert(line->inverse);
+    spin_chain5_linearise_lanes(coef, model->y, model->displacement, model->increment, model->inverse, model->slope);
+    spin_chain5_invert(model->inverse);
     for (int i = 0; i < 15; ++i)
         for (int j = 0; j < 15; ++j) {
             spin_chain5_lanes sum = { 0.0 };
             for (int k = 0; k < 15; ++k) {
                 spin_chain5_EACH_LANE
                 for (int lane = 0; lane < spin_chain5_LANES; ++lane)
-                    sum[lane] += line->slope[i * 15 + k][lane] * line->inverse[k * 15 + j][lane];
+                    sum[lane] += model->slope[i * 15 + k][lane] * model->inverse[k * 15 + j][lane];
             }
-            memcpy(line->gain[i * 15 + j], sum, sizeof sum);
+            memcpy(model->gain[i * 15 + j], sum, sizeof sum);
         }
 }
 
@@ -4533,7 +4534,7 @@ static void spin_chain5_sizes(spin_chain5_lanes y[restrict 15], spin_chain5_lane
 }
 
 /* Correct y by the residuals, with the inverse in the table, and measure the corrections. */
-static void spin_chain5_correct(spin_chain5_lines *line, spin_chain5_lanes size)
+static void spin_chain5_correct(spin_chain5_model *model, spin_chain5_lanes size)
 {
     spin_chain5_lanes delta[15];
     memset(delta, 0, sizeof delta);
@@ -4541,15 +4542,15 @@ static void spin_chain5_correct(spin_chain5_lines *line, spin_chain5_lanes size)
         for (int j = 0; j < 15; ++j) {
             spin_chain5_EACH_LANE
             for (int lane = 0; lane < spin_chain5_LANES; ++lane)
-                delta[i][lane] += line->inverse[i * 15 + j][lane] * line->residual[j][lane];
+                delta[i][lane] += model->inverse[i * 15 + j][lane] * model->residual[j][lane];
         }
-    spin_chain5_sizes(line->y, delta, size);
+    spin_chain5_sizes(model->y, delta, size);
     for (int i = 0; i < 15; ++i)
-        for (int lane = 0; lane < spin_chain5_LANES; ++lane) line->y[i][lane] -= delta[i][lane];
+        for (int lane = 0; lane < spin_chain5_LANES; ++lane) model->y[i][lane] -= delta[i][lane];
 }
 
-/* The largest of the lanes, which are not negative; infinite if one is not finite. As integers, the bits of numbers that are not negative have their
-   order, and those of what is no number are larger. */
+/* The largest of the lanes, none of which is negative; infinite if one is not finite. As integers, the bits of such
+   numbers have their order, and those of what is no number are larger. */
 static double spin_chain5_largest(const spin_chain5_lanes size)
 {
     uint64_t bits[8], most = 0;
@@ -4582,27 +4583,27 @@ static double spin_chain5_remaining(double size, double bend, double bound)
 }
 
 /* The table of a stage, with its matrices or with those of the last pass. */
-static void spin_chain5_update(spin_chain5_lanes coef[restrict], spin_chain5_lines *line, int matrices)
+static void spin_chain5_update(spin_chain5_lanes coef[restrict], spin_chain5_model *model, int matrices)
 {
     if (matrices)
-        spin_chain5_tabulate(coef, line);
+        spin_chain5_tabulate(coef, model);
     else
-        spin_chain5_evaluate_lanes(coef, line->y, line->displacement, line->increment);
+        spin_chain5_evaluate_lanes(coef, model->y, model->displacement, model->increment);
 }
 
-/* The steps of a block one after the other, each along the lines of its lane. As X, the state with its carry, gains
+/* The steps of a block one after the other, each along the linear model of its lane. As X, the state with its carry, gains
    increment - gain residual, the next residual follows from this one; X itself is added up apart. */
-static void spin_chain5_chain(spin_chain5_lines line[1], double x[15], double carry[15])
+static void spin_chain5_chain(spin_chain5_model model[1], double x[15], double carry[15])
 {
     double residual[15], sum[15], small[15];
     for (int i = 0; i < 15; ++i) {
-        residual[i] = ((line->y[i][0] - x[i]) + line->displacement[i][0]) - carry[i];
+        residual[i] = ((model->y[i][0] - x[i]) + model->displacement[i][0]) - carry[i];
         sum[i] = x[i];
         small[i] = carry[i];
     }
     for (int k = 0; k < 1 * spin_chain5_LANES; ++k) {
         const int lane = k / 1, after = (k + 1) / 1 % spin_chain5_LANES;
-        spin_chain5_lines *at = &line[k % 1], *next = &line[(k + 1) % 1];
+        spin_chain5_model *at = &model[k % 1], *next = &model[(k + 1) % 1];
         double even[15] = { 0.0 }, odd[15] = { 0.0 }; /* two sums, so that no long chain of additions is waited for */
         for (int i = 0; i < 15; ++i) {
             at->residual[i][lane] = residual[i];
@@ -4624,8 +4625,8 @@ static void spin_chain5_chain(spin_chain5_lines line[1], double x[15], double ca
     }
 }
 
-/* Bring the table up to date. */
-static void spin_chain5_tell(const spin_chain5_solver *s, spin_chain5_table *table)
+/* Bring the table up to date: coefficients, and weights that were fitted since. */
+static void spin_chain5_refresh(const spin_chain5_solver *s, spin_chain5_table *table)
 {
     for (int stage = 0; stage < 1; ++stage) {
         if (table->fits[stage] == s->memory[stage].fits) continue;
@@ -4656,7 +4657,7 @@ static void spin_chain5_foresee(const spin_chain5_memory *memory, spin_chain5_la
 
 /* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
    method, to leading order. */
-static void spin_chain5_march(const spin_chain5_solver *s, spin_chain5_table *table, spin_chain5_lines line[1])
+static void spin_chain5_march(const spin_chain5_solver *s, spin_chain5_table *table, spin_chain5_model model[1])
 {
     static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
     double x[15], point[15], slope[15], mean[15];
@@ -4673,12 +4674,12 @@ static void spin_chain5_march(const spin_chain5_solver *s, spin_chain5_table *ta
             }
         }
         for (int i = 0; i < 15; ++i) {
-            line[k % 1].y[i][k / 1] = x[i] + 0.5 * h * mean[i];
+            model[k % 1].y[i][k / 1] = x[i] + 0.5 * h * mean[i];
             x[i] += h * mean[i];
         }
     }
     for (int stage = 0; stage < 1; ++stage) {
-        spin_chain5_lines *at = &line[stage];
+        spin_chain5_model *at = &model[stage];
         spin_chain5_evaluate_lanes(table->coef[stage], at->y, at->displacement, at->increment);
         for (int i = 0; i < 15; ++i) {
             spin_chain5_EACH_LANE
@@ -4692,24 +4693,24 @@ static void spin_chain5_march(const spin_chain5_solver *s, spin_chain5_table *ta
    small as after a single step. How many passes that took; 0, and the solver as before, where it takes more than most. */
 static int spin_chain5_block(spin_chain5_solver *s, spin_chain5_table *table, int most)
 {
-    spin_chain5_lines line[1];
+    spin_chain5_model model[1];
     spin_chain5_lanes sizes;
     double x[15], carry[15], value[15], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
-    if (!s->foreseeing) spin_chain5_march(s, table, line);
+    if (!s->foreseeing) spin_chain5_march(s, table, model);
     for (int stage = 0; stage < 1; ++stage) {
-        if (s->foreseeing) spin_chain5_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
-        if (!spin_chain5_near_lanes(line[stage].y, s->x)) return 0;
+        if (s->foreseeing) spin_chain5_foresee(&s->memory[stage], table->weight[stage], model[stage].y);
+        if (!spin_chain5_near_lanes(model[stage].y, s->x)) return 0;
     }
     while (!solved) {
         double size = 0.0;
         const int matrices = previous > 1e-05;
-        for (int stage = 0; stage < 1; ++stage) spin_chain5_update(table->coef[stage], &line[stage], matrices);
+        for (int stage = 0; stage < 1; ++stage) spin_chain5_update(table->coef[stage], &model[stage], matrices);
         memcpy(x, s->x, sizeof x);
         memcpy(carry, s->carry, sizeof carry);
-        spin_chain5_chain(line, x, carry);
+        spin_chain5_chain(model, x, carry);
         for (int stage = 0; stage < 1; ++stage) {
-            spin_chain5_correct(&line[stage], sizes);
+            spin_chain5_correct(&model[stage], sizes);
             const double largest = spin_chain5_largest(sizes);
             size = largest > size ? largest : size;
         }
@@ -4729,7 +4730,7 @@ static int spin_chain5_block(spin_chain5_solver *s, spin_chain5_table *table, in
     for (int stage = 0; stage < 1; ++stage) {
         spin_chain5_memory *memory = &s->memory[stage];
         for (int lane = 0; lane < spin_chain5_LANES; ++lane) {
-            for (int i = 0; i < 15; ++i) value[i] = line[stage].y[i][lane];
+            for (int i = 0; i < 15; ++i) value[i] = model[stage].y[i][lane];
             spin_chain5_record(memory, value);
         }
         memory->slow = passes > 1 ? memory->slow + spin_chain5_LANES : 0;
@@ -4791,7 +4792,7 @@ spin_chain5_status spin_chain5_integrate(spin_chain5_solver *s, double h, size_t
     while (status == spin_chain5_OK && steps > 0) {
         if (steps >= spin_chain5_LANES && s->pause == 0) spin_chain5_choose_guess(s, steps);
         if (steps >= spin_chain5_LANES && s->pause == 0) {
-            spin_chain5_tell(s, &table);
+            spin_chain5_refresh(s, &table);
             const int passes = spin_chain5_block(s, &table, (int)(2 * s->effort + 0.5));
             spin_chain5_learn_from(s, passes);
             if (passes > 0) steps -= spin_chain5_LANES;
@@ -4952,24 +4953,24 @@ static void spin_chain5_group_predict(spin_chain5_group *group, int stage, spin_
 
 /* Newton's method for a stage, until the slowest lane is solved. The number of iterations; where that is the most
    allowed, lanes that are not solved leave the group. */
-static int spin_chain5_group_solve(spin_chain5_group *group, int stage, spin_chain5_lines *line)
+static int spin_chain5_group_solve(spin_chain5_group *group, int stage, spin_chain5_model *model)
 {
     spin_chain5_lanes size, previous, bound;
     double largest = HUGE_VAL, bend = 0.0;
     int iterations = 0, open = 1;
     for (int lane = 0; lane < spin_chain5_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
-    spin_chain5_group_predict(group, stage, line->y);
+    spin_chain5_group_predict(group, stage, model->y);
     for (; open > 0 && iterations < 20; ++iterations) {
         memcpy(previous, size, sizeof size);
-        spin_chain5_update(group->coef[stage], line, largest > 1e-05);
+        spin_chain5_update(group->coef[stage], model, largest > 1e-05);
         bend = largest > 1e-05 ? 0.0 : bend + largest;
         for (int i = 0; i < 15; ++i) {
             spin_chain5_EACH_LANE
             for (int lane = 0; lane < spin_chain5_LANES; ++lane)
-                line->residual[i][lane] =
-                    ((line->y[i][lane] - group->x[i][lane]) + line->displacement[i][lane]) - group->carry[i][lane];
+                model->residual[i][lane] =
+                    ((model->y[i][lane] - group->x[i][lane]) + model->displacement[i][lane]) - group->carry[i][lane];
         }
-        spin_chain5_correct(line, size);
+        spin_chain5_correct(model, size);
         open = spin_chain5_group_open(group, size, previous, bend, bound);
         largest = spin_chain5_largest(size);
     }
@@ -4980,18 +4981,18 @@ static int spin_chain5_group_solve(spin_chain5_group *group, int stage, spin_cha
 
 /* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
 static void spin_chain5_group_advance(spin_chain5_lanes x[restrict 15], spin_chain5_lanes carry[restrict 15],
-    spin_chain5_lines *line)
+    spin_chain5_model *model)
 {
     for (int i = 0; i < 15; ++i)
         for (int j = 0; j < 15; ++j) {
             spin_chain5_EACH_LANE
             for (int lane = 0; lane < spin_chain5_LANES; ++lane)
-                carry[i][lane] -= line->gain[i * 15 + j][lane] * line->residual[j][lane];
+                carry[i][lane] -= model->gain[i * 15 + j][lane] * model->residual[j][lane];
         }
     for (int i = 0; i < 15; ++i) {
         spin_chain5_EACH_LANE
         for (int lane = 0; lane < spin_chain5_LANES; ++lane) {
-            const double change = line->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
+            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
             const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
             x[i][lane] = sum + small;
             carry[i][lane] = small - (x[i][lane] - sum);
@@ -5003,17 +5004,17 @@ static void spin_chain5_group_advance(spin_chain5_lanes x[restrict 15], spin_cha
 static int spin_chain5_group_step(spin_chain5_group *group, size_t remaining)
 {
     spin_chain5_lanes x[15], carry[15];
-    spin_chain5_lines line;
+    spin_chain5_model model;
     const int next = (group->latest + 96 - 1) % 96;
     int active = 0, most = 0;
     memcpy(x, group->x, sizeof x);
     memcpy(carry, group->carry, sizeof carry);
     for (int stage = 0; stage < 1; ++stage) {
-        const int iterations = spin_chain5_group_solve(group, stage, &line);
-        spin_chain5_group_advance(group->x, group->carry, &line);
-        if (next % 8 == 0 || group->count < 8) spin_chain5_group_judge(group, stage, line.y);
+        const int iterations = spin_chain5_group_solve(group, stage, &model);
+        spin_chain5_group_advance(group->x, group->carry, &model);
+        if (next % 8 == 0 || group->count < 8) spin_chain5_group_judge(group, stage, model.y);
         if (iterations > most) most = iterations;
-        memcpy(group->past[stage][next], line.y, sizeof line.y);
+        memcpy(group->past[stage][next], model.y, sizeof model.y);
     }
     group->latest = next;
     if (group->count < 96) ++group->count;
@@ -5111,6 +5112,10 @@ spin_chain5_status spin_chain5_ensemble(const spin_chain5_params *params, double
     }
     return worst;
 }
+
+#if defined(__clang__)
+#pragma clang diagnostic pop
+#endif
 
 /* the Hamiltonian */
 static void spin_chain5_energy(const spin_chain5_params *params, const double x[15], double energy[restrict 1])

@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 0175e813f7e2bfa6cc16ecc85ae8f1ed924363ecbd66fa8a2ec88575bc27040a
+ * body-sha256: a06052f836a31419b3a3aafbc8606403ee3ed08e531186b46d139e583ee2bfad
  */
 #ifndef SPIN_CHAIN5_H
 #define SPIN_CHAIN5_H
@@ -73,7 +73,7 @@ typedef struct {
     int pause;      /* steps to make singly before a block is tried */
     int setback;    /* the last pause, halved with every block that succeeds */
     int foreseeing; /* whether blocks are guessed by recurrences */
-    int passes;     /* that the last block took which was not */
+    int passes;     /* that the last block took which was guessed by Runge-Kutta steps */
     size_t doubt;   /* steps to wait before recurrences are tried again */
     size_t retry;   /* steps after which that is */
     double coef[1][33]; /* what depends on params and h only, for each stage */

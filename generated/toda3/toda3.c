@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: f037a2ecea1d5b5448543ac9994471c287e5cefa70ccf4d28a9e5b6329c3d5ff
+ * body-sha256: 32a721362da2b4685a62c483f10442295918b3afaaa80c43ed15e1243139709b
  */
 #include "toda3.h"
 
@@ -609,6 +609,7 @@ typedef double toda3_lanes[toda3_LANES];
 
 #if defined(__clang__)
 #define toda3_EACH_LANE _Pragma("clang loop vectorize(assume_safety)")
+#pragma clang diagnostic push
 #pragma clang diagnostic ignored "-Wpass-failed"
 #elif defined(__GNUC__)
 #define toda3_EACH_LANE _Pragma("GCC ivdep") _Pragma("GCC unroll 1")
@@ -622,12 +623,12 @@ typedef struct {
     toda3_lanes coef[1][10], weight[1][32][5];
 } toda3_table;
 
-/* A stage in all lanes, linear around y: a residual r of alpha(y) = x takes inverse r from y and gain r from the
+/* A stage in all lanes, linearised around y: a residual r of alpha(y) = x takes inverse r from y and gain r from the
    increment. */
 typedef struct {
     toda3_lanes y[5], displacement[5], increment[5], residual[5];
     toda3_lanes inverse[25], slope[25], gain[25];
-} toda3_lines;
+} toda3_model;
 
 /* toda3_phi0 for the loops over lanes: no branches. Infinite beyond |s| = 4.0. */
 static inline double toda3_phi0_lane(double s)
@@ -931,19 +932,19 @@ static void toda3_invert(toda3_lanes matrix[restrict 25])
 }
 
 /* Everything about a stage at the points y. */
-static void toda3_tabulate(toda3_lanes coef[restrict], toda3_lines *line)
+static void toda3_tabulate(toda3_lanes coef[restrict], toda3_model *model)
 {
-    toda3_linearise_lanes(coef, line->y, line->displacement, line->increment, line->inverse, line->slope);
-    toda3_invert(line->inverse);
+    toda3_linearise_lanes(coef, model->y, model->displacement, model->increment, model->inverse, model->slope);
+    toda3_invert(model->inverse);
     for (int i = 0; i < 5; ++i)
         for (int j = 0; j < 5; ++j) {
             toda3_lanes sum = { 0.0 };
             for (int k = 0; k < 5; ++k) {
                 toda3_EACH_LANE
                 for (int lane = 0; lane < toda3_LANES; ++lane)
-                    sum[lane] += line->slope[i * 5 + k][lane] * line->inverse[k * 5 + j][lane];
+                    sum[lane] += model->slope[i * 5 + k][lane] * model->inverse[k * 5 + j][lane];
             }
-            memcpy(line->gain[i * 5 + j], sum, sizeof sum);
+            memcpy(model->gain[i * 5 + j], sum, sizeof sum);
         }
 }
 
@@ -964,7 +965,7 @@ static void toda3_sizes(toda3_lanes y[restrict 5], toda3_lanes delta[restrict 5]
 }
 
 /* Correct y by the residuals, with the inverse in the table, and measure the corrections. */
-static void toda3_correct(toda3_lines *line, toda3_lanes size)
+static void toda3_correct(toda3_model *model, toda3_lanes size)
 {
     toda3_lanes delta[5];
     memset(delta, 0, sizeof delta);
@@ -972,15 +973,15 @@ static void toda3_correct(toda3_lines *line, toda3_lanes size)
         for (int j = 0; j < 5; ++j) {
             toda3_EACH_LANE
             for (int lane = 0; lane < toda3_LANES; ++lane)
-                delta[i][lane] += line->inverse[i * 5 + j][lane] * line->residual[j][lane];
+                delta[i][lane] += model->inverse[i * 5 + j][lane] * model->residual[j][lane];
         }
-    toda3_sizes(line->y, delta, size);
+    toda3_sizes(model->y, delta, size);
     for (int i = 0; i < 5; ++i)
-        for (int lane = 0; lane < toda3_LANES; ++lane) line->y[i][lane] -= delta[i][lane];
+        for (int lane = 0; lane < toda3_LANES; ++lane) model->y[i][lane] -= delta[i][lane];
 }
 
-/* The largest of the lanes, which are not negative; infinite if one is not finite. As integers, the bits of numbers that are not negative have their
-   order, and those of what is no number are larger. */
+/* The largest of the lanes, none of which is negative; infinite if one is not finite. As integers, the bits of such
+   numbers have their order, and those of what is no number are larger. */
 static double toda3_largest(const toda3_lanes size)
 {
     uint64_t bits[8], most = 0;
@@ -1013,27 +1014,27 @@ static double toda3_remaining(double size, double bend, double bound)
 }
 
 /* The table of a stage, with its matrices or with those of the last pass. */
-static void toda3_update(toda3_lanes coef[restrict], toda3_lines *line, int matrices)
+static void toda3_update(toda3_lanes coef[restrict], toda3_model *model, int matrices)
 {
     if (matrices)
-        toda3_tabulate(coef, line);
+        toda3_tabulate(coef, model);
     else
-        toda3_evaluate_lanes(coef, line->y, line->displacement, line->increment);
+        toda3_evaluate_lanes(coef, model->y, model->displacement, model->increment);
 }
 
-/* The steps of a block one after the other, each along the lines of its lane. As X, the state with its carry, gains
+/* The steps of a block one after the other, each along the linear model of its lane. As X, the state with its carry, gains
    increment - gain residual, the next residual follows from this one; X itself is added up apart. */
-static void toda3_chain(toda3_lines line[1], double x[5], double carry[5])
+static void toda3_chain(toda3_model model[1], double x[5], double carry[5])
 {
     double residual[5], sum[5], small[5];
     for (int i = 0; i < 5; ++i) {
-        residual[i] = ((line->y[i][0] - x[i]) + line->displacement[i][0]) - carry[i];
+        residual[i] = ((model->y[i][0] - x[i]) + model->displacement[i][0]) - carry[i];
         sum[i] = x[i];
         small[i] = carry[i];
     }
     for (int k = 0; k < 1 * toda3_LANES; ++k) {
         const int lane = k / 1, after = (k + 1) / 1 % toda3_LANES;
-        toda3_lines *at = &line[k % 1], *next = &line[(k + 1) % 1];
+        toda3_model *at = &model[k % 1], *next = &model[(k + 1) % 1];
         double even[5] = { 0.0 }, odd[5] = { 0.0 }; /* two sums, so that no long chain of additions is waited for */
         for (int i = 0; i < 5; ++i) {
             at->residual[i][lane] = residual[i];
@@ -1055,8 +1056,8 @@ static void toda3_chain(toda3_lines line[1], double x[5], double carry[5])
     }
 }
 
-/* Bring the table up to date. */
-static void toda3_tell(const toda3_solver *s, toda3_table *table)
+/* Bring the table up to date: coefficients, and weights that were fitted since. */
+static void toda3_refresh(const toda3_solver *s, toda3_table *table)
 {
     for (int stage = 0; stage < 1; ++stage) {
         if (table->fits[stage] == s->memory[stage].fits) continue;
@@ -1087,7 +1088,7 @@ static void toda3_foresee(const toda3_memory *memory, toda3_lanes weight[restric
 
 /* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
    method, to leading order. */
-static void toda3_march(const toda3_solver *s, toda3_table *table, toda3_lines line[1])
+static void toda3_march(const toda3_solver *s, toda3_table *table, toda3_model model[1])
 {
     static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
     double x[5], point[5], slope[5], mean[5];
@@ -1104,12 +1105,12 @@ static void toda3_march(const toda3_solver *s, toda3_table *table, toda3_lines l
             }
         }
         for (int i = 0; i < 5; ++i) {
-            line[k % 1].y[i][k / 1] = x[i] + 0.5 * h * mean[i];
+            model[k % 1].y[i][k / 1] = x[i] + 0.5 * h * mean[i];
             x[i] += h * mean[i];
         }
     }
     for (int stage = 0; stage < 1; ++stage) {
-        toda3_lines *at = &line[stage];
+        toda3_model *at = &model[stage];
         toda3_evaluate_lanes(table->coef[stage], at->y, at->displacement, at->increment);
         for (int i = 0; i < 5; ++i) {
             toda3_EACH_LANE
@@ -1123,24 +1124,24 @@ static void toda3_march(const toda3_solver *s, toda3_table *table, toda3_lines l
    small as after a single step. How many passes that took; 0, and the solver as before, where it takes more than most. */
 static int toda3_block(toda3_solver *s, toda3_table *table, int most)
 {
-    toda3_lines line[1];
+    toda3_model model[1];
     toda3_lanes sizes;
     double x[5], carry[5], value[5], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
-    if (!s->foreseeing) toda3_march(s, table, line);
+    if (!s->foreseeing) toda3_march(s, table, model);
     for (int stage = 0; stage < 1; ++stage) {
-        if (s->foreseeing) toda3_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
-        if (!toda3_near_lanes(line[stage].y, s->x)) return 0;
+        if (s->foreseeing) toda3_foresee(&s->memory[stage], table->weight[stage], model[stage].y);
+        if (!toda3_near_lanes(model[stage].y, s->x)) return 0;
     }
     while (!solved) {
         double size = 0.0;
         const int matrices = previous > 1e-05;
-        for (int stage = 0; stage < 1; ++stage) toda3_update(table->coef[stage], &line[stage], matrices);
+        for (int stage = 0; stage < 1; ++stage) toda3_update(table->coef[stage], &model[stage], matrices);
         memcpy(x, s->x, sizeof x);
         memcpy(carry, s->carry, sizeof carry);
-        toda3_chain(line, x, carry);
+        toda3_chain(model, x, carry);
         for (int stage = 0; stage < 1; ++stage) {
-            toda3_correct(&line[stage], sizes);
+            toda3_correct(&model[stage], sizes);
             const double largest = toda3_largest(sizes);
             size = largest > size ? largest : size;
         }
@@ -1160,7 +1161,7 @@ static int toda3_block(toda3_solver *s, toda3_table *table, int most)
     for (int stage = 0; stage < 1; ++stage) {
         toda3_memory *memory = &s->memory[stage];
         for (int lane = 0; lane < toda3_LANES; ++lane) {
-            for (int i = 0; i < 5; ++i) value[i] = line[stage].y[i][lane];
+            for (int i = 0; i < 5; ++i) value[i] = model[stage].y[i][lane];
             toda3_record(memory, value);
         }
         memory->slow = passes > 1 ? memory->slow + toda3_LANES : 0;
@@ -1222,7 +1223,7 @@ toda3_status toda3_integrate(toda3_solver *s, double h, size_t steps)
     while (status == toda3_OK && steps > 0) {
         if (steps >= toda3_LANES && s->pause == 0) toda3_choose_guess(s, steps);
         if (steps >= toda3_LANES && s->pause == 0) {
-            toda3_tell(s, &table);
+            toda3_refresh(s, &table);
             const int passes = toda3_block(s, &table, (int)(2 * s->effort + 0.5));
             toda3_learn_from(s, passes);
             if (passes > 0) steps -= toda3_LANES;
@@ -1382,24 +1383,24 @@ static void toda3_group_predict(toda3_group *group, int stage, toda3_lanes y[5])
 
 /* Newton's method for a stage, until the slowest lane is solved. The number of iterations; where that is the most
    allowed, lanes that are not solved leave the group. */
-static int toda3_group_solve(toda3_group *group, int stage, toda3_lines *line)
+static int toda3_group_solve(toda3_group *group, int stage, toda3_model *model)
 {
     toda3_lanes size, previous, bound;
     double largest = HUGE_VAL, bend = 0.0;
     int iterations = 0, open = 1;
     for (int lane = 0; lane < toda3_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
-    toda3_group_predict(group, stage, line->y);
+    toda3_group_predict(group, stage, model->y);
     for (; open > 0 && iterations < 20; ++iterations) {
         memcpy(previous, size, sizeof size);
-        toda3_update(group->coef[stage], line, largest > 1e-05);
+        toda3_update(group->coef[stage], model, largest > 1e-05);
         bend = largest > 1e-05 ? 0.0 : bend + largest;
         for (int i = 0; i < 5; ++i) {
             toda3_EACH_LANE
             for (int lane = 0; lane < toda3_LANES; ++lane)
-                line->residual[i][lane] =
-                    ((line->y[i][lane] - group->x[i][lane]) + line->displacement[i][lane]) - group->carry[i][lane];
+                model->residual[i][lane] =
+                    ((model->y[i][lane] - group->x[i][lane]) + model->displacement[i][lane]) - group->carry[i][lane];
         }
-        toda3_correct(line, size);
+        toda3_correct(model, size);
         open = toda3_group_open(group, size, previous, bend, bound);
         largest = toda3_largest(size);
     }
@@ -1410,18 +1411,18 @@ static int toda3_group_solve(toda3_group *group, int stage, toda3_lines *line)
 
 /* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
 static void toda3_group_advance(toda3_lanes x[restrict 5], toda3_lanes carry[restrict 5],
-    toda3_lines *line)
+    toda3_model *model)
 {
     for (int i = 0; i < 5; ++i)
         for (int j = 0; j < 5; ++j) {
             toda3_EACH_LANE
             for (int lane = 0; lane < toda3_LANES; ++lane)
-                carry[i][lane] -= line->gain[i * 5 + j][lane] * line->residual[j][lane];
+                carry[i][lane] -= model->gain[i * 5 + j][lane] * model->residual[j][lane];
         }
     for (int i = 0; i < 5; ++i) {
         toda3_EACH_LANE
         for (int lane = 0; lane < toda3_LANES; ++lane) {
-            const double change = line->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
+            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
             const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
             x[i][lane] = sum + small;
             carry[i][lane] = small - (x[i][lane] - sum);
@@ -1433,17 +1434,17 @@ static void toda3_group_advance(toda3_lanes x[restrict 5], toda3_lanes carry[res
 static int toda3_group_step(toda3_group *group, size_t remaining)
 {
     toda3_lanes x[5], carry[5];
-    toda3_lines line;
+    toda3_model model;
     const int next = (group->latest + 96 - 1) % 96;
     int active = 0, most = 0;
     memcpy(x, group->x, sizeof x);
     memcpy(carry, group->carry, sizeof carry);
     for (int stage = 0; stage < 1; ++stage) {
-        const int iterations = toda3_group_solve(group, stage, &line);
-        toda3_group_advance(group->x, group->carry, &line);
-        if (next % 8 == 0 || group->count < 8) toda3_group_judge(group, stage, line.y);
+        const int iterations = toda3_group_solve(group, stage, &model);
+        toda3_group_advance(group->x, group->carry, &model);
+        if (next % 8 == 0 || group->count < 8) toda3_group_judge(group, stage, model.y);
         if (iterations > most) most = iterations;
-        memcpy(group->past[stage][next], line.y, sizeof line.y);
+        memcpy(group->past[stage][next], model.y, sizeof model.y);
     }
     group->latest = next;
     if (group->count < 96) ++group->count;
@@ -1540,6 +1541,10 @@ toda3_status toda3_ensemble(const toda3_params *params, double *x, size_t member
     }
     return worst;
 }
+
+#if defined(__clang__)
+#pragma clang diagnostic pop
+#endif
 
 /* the Hamiltonian */
 static void toda3_energy(const toda3_params *params, const double x[5], double energy[restrict 1])

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 20a1cf7fa0bd1ada65da1fe2d3f45d4cfcb89a19c31324fb96dc1c63f3510881
+ * body-sha256: af208bccca712aea2a8d0e5115a6598d9f3419e07473a5d634e54951f3a77db1
  */
 #ifndef TODA3_H
 #define TODA3_H
@@ -71,7 +71,7 @@ typedef struct {
     int pause;      /* steps to make singly before a block is tried */
     int setback;    /* the last pause, halved with every block that succeeds */
     int foreseeing; /* whether blocks are guessed by recurrences */
-    int passes;     /* that the last block took which was not */
+    int passes;     /* that the last block took which was guessed by Runge-Kutta steps */
     size_t doubt;   /* steps to wait before recurrences are tried again */
     size_t retry;   /* steps after which that is */
     double coef[1][10]; /* what depends on params and h only, for each stage */

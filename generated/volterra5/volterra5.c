@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 1038a4b4c7230bc1f3c42e42938a0f1b0655f4991bdadf36a5657d96f979b21f
+ * body-sha256: 1ce06be9803bfec3346d40ecea1eb515de9d49f259fe7c888314416a959d377c
  */
 #include "volterra5.h"
 
@@ -519,6 +519,7 @@ typedef double volterra5_lanes[volterra5_LANES];
 
 #if defined(__clang__)
 #define volterra5_EACH_LANE _Pragma("clang loop vectorize(assume_safety)")
+#pragma clang diagnostic push
 #pragma clang diagnostic ignored "-Wpass-failed"
 #elif defined(__GNUC__)
 #define volterra5_EACH_LANE _Pragma("GCC ivdep") _Pragma("GCC unroll 1")
@@ -532,12 +533,12 @@ typedef struct {
     volterra5_lanes coef[1][4], weight[1][32][5];
 } volterra5_table;
 
-/* A stage in all lanes, linear around y: a residual r of alpha(y) = x takes inverse r from y and gain r from the
+/* A stage in all lanes, linearised around y: a residual r of alpha(y) = x takes inverse r from y and gain r from the
    increment. */
 typedef struct {
     volterra5_lanes y[5], displacement[5], increment[5], residual[5];
     volterra5_lanes inverse[25], slope[25], gain[25];
-} volterra5_lines;
+} volterra5_model;
 
 /* exp(u) - 1 for the loops over lanes: u = k log 2 + r, no branches. Infinite beyond |u| = 700.0. */
 static inline double volterra5_expm1_lane(double u)
@@ -839,19 +840,19 @@ static void volterra5_invert(volterra5_lanes matrix[restrict 25])
 }
 
 /* Everything about a stage at the points y. */
-static void volterra5_tabulate(volterra5_lanes coef[restrict], volterra5_lines *line)
+static void volterra5_tabulate(volterra5_lanes coef[restrict], volterra5_model *model)
 {
-    volterra5_linearise_lanes(coef, line->y, line->displacement, line->increment, line->inverse, line->slope);
-    volterra5_invert(line->inverse);
+    volterra5_linearise_lanes(coef, model->y, model->displacement, model->increment, model->inverse, model->slope);
+    volterra5_invert(model->inverse);
     for (int i = 0; i < 5; ++i)
         for (int j = 0; j < 5; ++j) {
             volterra5_lanes sum = { 0.0 };
             for (int k = 0; k < 5; ++k) {
                 volterra5_EACH_LANE
                 for (int lane = 0; lane < volterra5_LANES; ++lane)
-                    sum[lane] += line->slope[i * 5 + k][lane] * line->inverse[k * 5 + j][lane];
+                    sum[lane] += model->slope[i * 5 + k][lane] * model->inverse[k * 5 + j][lane];
             }
-            memcpy(line->gain[i * 5 + j], sum, sizeof sum);
+            memcpy(model->gain[i * 5 + j], sum, sizeof sum);
         }
 }
 
@@ -872,7 +873,7 @@ static void volterra5_sizes(volterra5_lanes y[restrict 5], volterra5_lanes delta
 }
 
 /* Correct y by the residuals, with the inverse in the table, and measure the corrections. */
-static void volterra5_correct(volterra5_lines *line, volterra5_lanes size)
+static void volterra5_correct(volterra5_model *model, volterra5_lanes size)
 {
     volterra5_lanes delta[5];
     memset(delta, 0, sizeof delta);
@@ -880,15 +881,15 @@ static void volterra5_correct(volterra5_lines *line, volterra5_lanes size)
         for (int j = 0; j < 5; ++j) {
             volterra5_EACH_LANE
             for (int lane = 0; lane < volterra5_LANES; ++lane)
-                delta[i][lane] += line->inverse[i * 5 + j][lane] * line->residual[j][lane];
+                delta[i][lane] += model->inverse[i * 5 + j][lane] * model->residual[j][lane];
         }
-    volterra5_sizes(line->y, delta, size);
+    volterra5_sizes(model->y, delta, size);
     for (int i = 0; i < 5; ++i)
-        for (int lane = 0; lane < volterra5_LANES; ++lane) line->y[i][lane] -= delta[i][lane];
+        for (int lane = 0; lane < volterra5_LANES; ++lane) model->y[i][lane] -= delta[i][lane];
 }
 
-/* The largest of the lanes, which are not negative; infinite if one is not finite. As integers, the bits of numbers that are not negative have their
-   order, and those of what is no number are larger. */
+/* The largest of the lanes, none of which is negative; infinite if one is not finite. As integers, the bits of such
+   numbers have their order, and those of what is no number are larger. */
 static double volterra5_largest(const volterra5_lanes size)
 {
     uint64_t bits[8], most = 0;
@@ -921,27 +922,27 @@ static double volterra5_remaining(double size, double bend, double bound)
 }
 
 /* The table of a stage, with its matrices or with those of the last pass. */
-static void volterra5_update(volterra5_lanes coef[restrict], volterra5_lines *line, int matrices)
+static void volterra5_update(volterra5_lanes coef[restrict], volterra5_model *model, int matrices)
 {
     if (matrices)
-        volterra5_tabulate(coef, line);
+        volterra5_tabulate(coef, model);
     else
-        volterra5_evaluate_lanes(coef, line->y, line->displacement, line->increment);
+        volterra5_evaluate_lanes(coef, model->y, model->displacement, model->increment);
 }
 
-/* The steps of a block one after the other, each along the lines of its lane. As X, the state with its carry, gains
+/* The steps of a block one after the other, each along the linear model of its lane. As X, the state with its carry, gains
    increment - gain residual, the next residual follows from this one; X itself is added up apart. */
-static void volterra5_chain(volterra5_lines line[1], double x[5], double carry[5])
+static void volterra5_chain(volterra5_model model[1], double x[5], double carry[5])
 {
     double residual[5], sum[5], small[5];
     for (int i = 0; i < 5; ++i) {
-        residual[i] = ((line->y[i][0] - x[i]) + line->displacement[i][0]) - carry[i];
+        residual[i] = ((model->y[i][0] - x[i]) + model->displacement[i][0]) - carry[i];
         sum[i] = x[i];
         small[i] = carry[i];
     }
     for (int k = 0; k < 1 * volterra5_LANES; ++k) {
         const int lane = k / 1, after = (k + 1) / 1 % volterra5_LANES;
-        volterra5_lines *at = &line[k % 1], *next = &line[(k + 1) % 1];
+        volterra5_model *at = &model[k % 1], *next = &model[(k + 1) % 1];
         double even[5] = { 0.0 }, odd[5] = { 0.0 }; /* two sums, so that no long chain of additions is waited for */
         for (int i = 0; i < 5; ++i) {
             at->residual[i][lane] = residual[i];
@@ -963,8 +964,8 @@ static void volterra5_chain(volterra5_lines line[1], double x[5], double carry[5
     }
 }
 
-/* Bring the table up to date. */
-static void volterra5_tell(const volterra5_solver *s, volterra5_table *table)
+/* Bring the table up to date: coefficients, and weights that were fitted since. */
+static void volterra5_refresh(const volterra5_solver *s, volterra5_table *table)
 {
     for (int stage = 0; stage < 1; ++stage) {
         if (table->fits[stage] == s->memory[stage].fits) continue;
@@ -995,7 +996,7 @@ static void volterra5_foresee(const volterra5_memory *memory, volterra5_lanes we
 
 /* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
    method, to leading order. */
-static void volterra5_march(const volterra5_solver *s, volterra5_table *table, volterra5_lines line[1])
+static void volterra5_march(const volterra5_solver *s, volterra5_table *table, volterra5_model model[1])
 {
     static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
     double x[5], point[5], slope[5], mean[5];
@@ -1012,12 +1013,12 @@ static void volterra5_march(const volterra5_solver *s, volterra5_table *table, v
             }
         }
         for (int i = 0; i < 5; ++i) {
-            line[k % 1].y[i][k / 1] = x[i] + 0.5 * h * mean[i];
+            model[k % 1].y[i][k / 1] = x[i] + 0.5 * h * mean[i];
             x[i] += h * mean[i];
         }
     }
     for (int stage = 0; stage < 1; ++stage) {
-        volterra5_lines *at = &line[stage];
+        volterra5_model *at = &model[stage];
         volterra5_evaluate_lanes(table->coef[stage], at->y, at->displacement, at->increment);
         for (int i = 0; i < 5; ++i) {
             volterra5_EACH_LANE
@@ -1031,24 +1032,24 @@ static void volterra5_march(const volterra5_solver *s, volterra5_table *table, v
    small as after a single step. How many passes that took; 0, and the solver as before, where it takes more than most. */
 static int volterra5_block(volterra5_solver *s, volterra5_table *table, int most)
 {
-    volterra5_lines line[1];
+    volterra5_model model[1];
     volterra5_lanes sizes;
     double x[5], carry[5], value[5], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
-    if (!s->foreseeing) volterra5_march(s, table, line);
+    if (!s->foreseeing) volterra5_march(s, table, model);
     for (int stage = 0; stage < 1; ++stage) {
-        if (s->foreseeing) volterra5_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
-        if (!volterra5_near_lanes(line[stage].y, s->x)) return 0;
+        if (s->foreseeing) volterra5_foresee(&s->memory[stage], table->weight[stage], model[stage].y);
+        if (!volterra5_near_lanes(model[stage].y, s->x)) return 0;
     }
     while (!solved) {
         double size = 0.0;
         const int matrices = previous > 1e-05;
-        for (int stage = 0; stage < 1; ++stage) volterra5_update(table->coef[stage], &line[stage], matrices);
+        for (int stage = 0; stage < 1; ++stage) volterra5_update(table->coef[stage], &model[stage], matrices);
         memcpy(x, s->x, sizeof x);
         memcpy(carry, s->carry, sizeof carry);
-        volterra5_chain(line, x, carry);
+        volterra5_chain(model, x, carry);
         for (int stage = 0; stage < 1; ++stage) {
-            volterra5_correct(&line[stage], sizes);
+            volterra5_correct(&model[stage], sizes);
             const double largest = volterra5_largest(sizes);
             size = largest > size ? largest : size;
         }
@@ -1068,7 +1069,7 @@ static int volterra5_block(volterra5_solver *s, volterra5_table *table, int most
     for (int stage = 0; stage < 1; ++stage) {
         volterra5_memory *memory = &s->memory[stage];
         for (int lane = 0; lane < volterra5_LANES; ++lane) {
-            for (int i = 0; i < 5; ++i) value[i] = line[stage].y[i][lane];
+            for (int i = 0; i < 5; ++i) value[i] = model[stage].y[i][lane];
             volterra5_record(memory, value);
         }
         memory->slow = passes > 1 ? memory->slow + volterra5_LANES : 0;
@@ -1130,7 +1131,7 @@ volterra5_status volterra5_integrate(volterra5_solver *s, double h, size_t steps
     while (status == volterra5_OK && steps > 0) {
         if (steps >= volterra5_LANES && s->pause == 0) volterra5_choose_guess(s, steps);
         if (steps >= volterra5_LANES && s->pause == 0) {
-            volterra5_tell(s, &table);
+            volterra5_refresh(s, &table);
             const int passes = volterra5_block(s, &table, (int)(2 * s->effort + 0.5));
             volterra5_learn_from(s, passes);
             if (passes > 0) steps -= volterra5_LANES;
@@ -1290,24 +1291,24 @@ static void volterra5_group_predict(volterra5_group *group, int stage, volterra5
 
 /* Newton's method for a stage, until the slowest lane is solved. The number of iterations; where that is the most
    allowed, lanes that are not solved leave the group. */
-static int volterra5_group_solve(volterra5_group *group, int stage, volterra5_lines *line)
+static int volterra5_group_solve(volterra5_group *group, int stage, volterra5_model *model)
 {
     volterra5_lanes size, previous, bound;
     double largest = HUGE_VAL, bend = 0.0;
     int iterations = 0, open = 1;
     for (int lane = 0; lane < volterra5_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
-    volterra5_group_predict(group, stage, line->y);
+    volterra5_group_predict(group, stage, model->y);
     for (; open > 0 && iterations < 20; ++iterations) {
         memcpy(previous, size, sizeof size);
-        volterra5_update(group->coef[stage], line, largest > 1e-05);
+        volterra5_update(group->coef[stage], model, largest > 1e-05);
         bend = largest > 1e-05 ? 0.0 : bend + largest;
         for (int i = 0; i < 5; ++i) {
             volterra5_EACH_LANE
             for (int lane = 0; lane < volterra5_LANES; ++lane)
-                line->residual[i][lane] =
-                    ((line->y[i][lane] - group->x[i][lane]) + line->displacement[i][lane]) - group->carry[i][lane];
+                model->residual[i][lane] =
+                    ((model->y[i][lane] - group->x[i][lane]) + model->displacement[i][lane]) - group->carry[i][lane];
         }
-        volterra5_correct(line, size);
+        volterra5_correct(model, size);
         open = volterra5_group_open(group, size, previous, bend, bound);
         largest = volterra5_largest(size);
     }
@@ -1318,18 +1319,18 @@ static int volterra5_group_solve(volterra5_group *group, int stage, volterra5_li
 
 /* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
 static void volterra5_group_advance(volterra5_lanes x[restrict 5], volterra5_lanes carry[restrict 5],
-    volterra5_lines *line)
+    volterra5_model *model)
 {
     for (int i = 0; i < 5; ++i)
         for (int j = 0; j < 5; ++j) {
             volterra5_EACH_LANE
             for (int lane = 0; lane < volterra5_LANES; ++lane)
-                carry[i][lane] -= line->gain[i * 5 + j][lane] * line->residual[j][lane];
+                carry[i][lane] -= model->gain[i * 5 + j][lane] * model->residual[j][lane];
         }
     for (int i = 0; i < 5; ++i) {
         volterra5_EACH_LANE
         for (int lane = 0; lane < volterra5_LANES; ++lane) {
-            const double change = line->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
+            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
             const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
             x[i][lane] = sum + small;
             carry[i][lane] = small - (x[i][lane] - sum);
@@ -1341,17 +1342,17 @@ static void volterra5_group_advance(volterra5_lanes x[restrict 5], volterra5_lan
 static int volterra5_group_step(volterra5_group *group, size_t remaining)
 {
     volterra5_lanes x[5], carry[5];
-    volterra5_lines line;
+    volterra5_model model;
     const int next = (group->latest + 96 - 1) % 96;
     int active = 0, most = 0;
     memcpy(x, group->x, sizeof x);
     memcpy(carry, group->carry, sizeof carry);
     for (int stage = 0; stage < 1; ++stage) {
-        const int iterations = volterra5_group_solve(group, stage, &line);
-        volterra5_group_advance(group->x, group->carry, &line);
-        if (next % 8 == 0 || group->count < 8) volterra5_group_judge(group, stage, line.y);
+        const int iterations = volterra5_group_solve(group, stage, &model);
+        volterra5_group_advance(group->x, group->carry, &model);
+        if (next % 8 == 0 || group->count < 8) volterra5_group_judge(group, stage, model.y);
         if (iterations > most) most = iterations;
-        memcpy(group->past[stage][next], line.y, sizeof line.y);
+        memcpy(group->past[stage][next], model.y, sizeof model.y);
     }
     group->latest = next;
     if (group->count < 96) ++group->count;
@@ -1448,6 +1449,10 @@ volterra5_status volterra5_ensemble(const volterra5_params *params, double *x, s
     }
     return worst;
 }
+
+#if defined(__clang__)
+#pragma clang diagnostic pop
+#endif
 
 /* the Hamiltonian */
 static void volterra5_energy(const volterra5_params *params, const double x[5], double energy[restrict 1])

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: c960cdd8fa253e23738fa46463ca400fef3a85c014b650bfd348a98f202252aa
+ * body-sha256: a04bad1735ebcc197e5f4fa29c9ff3e928c4f2d006c59dc99f30e25c29a56a29
  */
 #ifndef VOLTERRA5_H
 #define VOLTERRA5_H
@@ -71,7 +71,7 @@ typedef struct {
     int pause;      /* steps to make singly before a block is tried */
     int setback;    /* the last pause, halved with every block that succeeds */
     int foreseeing; /* whether blocks are guessed by recurrences */
-    int passes;     /* that the last block took which was not */
+    int passes;     /* that the last block took which was guessed by Runge-Kutta steps */
     size_t doubt;   /* steps to wait before recurrences are tried again */
     size_t retry;   /* steps after which that is */
     double coef[1][4]; /* what depends on params and h only, for each stage */

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 179a8afe94e43f25620713efbf1441213d775312680a38a480185daa2b4ca817
+ * body-sha256: f073430fb57b538ee6b4c604be21d73e4a7152e435f024d7ace9183d9c8c5f1d
  */
 #include "vortices3.h"
 
@@ -1027,6 +1027,7 @@ typedef double vortices3_lanes[vortices3_LANES];
 
 #if defined(__clang__)
 #define vortices3_EACH_LANE _Pragma("clang loop vectorize(assume_safety)")
+#pragma clang diagnostic push
 #pragma clang diagnostic ignored "-Wpass-failed"
 #elif defined(__GNUC__)
 #define vortices3_EACH_LANE _Pragma("GCC ivdep") _Pragma("GCC unroll 1")
@@ -1040,12 +1041,12 @@ typedef struct {
     vortices3_lanes coef[1][3], weight[1][32][6];
 } vortices3_table;
 
-/* A stage in all lanes, linear around y: a residual r of alpha(y) = x takes inverse r from y and gain r from the
+/* A stage in all lanes, linearised around y: a residual r of alpha(y) = x takes inverse r from y and gain r from the
    increment. */
 typedef struct {
     vortices3_lanes y[6], displacement[6], increment[6], residual[6];
     vortices3_lanes inverse[36], slope[36], gain[36];
-} vortices3_lines;
+} vortices3_model;
 
 /* vortices3_linearise_lanes_part1 (part 1 of 4) */
 vortices3_APART static void vortices3_linearise_lanes_part1(vortices3_lanes coef[restrict 3],
@@ -1891,19 +1892,19 @@ static void vortices3_invert(vortices3_lanes matrix[restrict 36])
 }
 
 /* Everything about a stage at the points y. */
-static void vortices3_tabulate(vortices3_lanes coef[restrict], vortices3_lines *line)
+static void vortices3_tabulate(vortices3_lanes coef[restrict], vortices3_model *model)
 {
-    vortices3_linearise_lanes(coef, line->y, line->displacement, line->increment, line->inverse, line->slope);
-    vortices3_invert(line->inverse);
+    vortices3_linearise_lanes(coef, model->y, model->displacement, model->increment, model->inverse, model->slope);
+    vortices3_invert(model->inverse);
     for (int i = 0; i < 6; ++i)
         for (int j = 0; j < 6; ++j) {
             vortices3_lanes sum = { 0.0 };
             for (int k = 0; k < 6; ++k) {
                 vortices3_EACH_LANE
                 for (int lane = 0; lane < vortices3_LANES; ++lane)
-                    sum[lane] += line->slope[i * 6 + k][lane] * line->inverse[k * 6 + j][lane];
+                    sum[lane] += model->slope[i * 6 + k][lane] * model->inverse[k * 6 + j][lane];
             }
-            memcpy(line->gain[i * 6 + j], sum, sizeof sum);
+            memcpy(model->gain[i * 6 + j], sum, sizeof sum);
         }
 }
 
@@ -1924,7 +1925,7 @@ static void vortices3_sizes(vortices3_lanes y[restrict 6], vortices3_lanes delta
 }
 
 /* Correct y by the residuals, with the inverse in the table, and measure the corrections. */
-static void vortices3_correct(vortices3_lines *line, vortices3_lanes size)
+static void vortices3_correct(vortices3_model *model, vortices3_lanes size)
 {
     vortices3_lanes delta[6];
     memset(delta, 0, sizeof delta);
@@ -1932,15 +1933,15 @@ static void vortices3_correct(vortices3_lines *line, vortices3_lanes size)
         for (int j = 0; j < 6; ++j) {
             vortices3_EACH_LANE
             for (int lane = 0; lane < vortices3_LANES; ++lane)
-                delta[i][lane] += line->inverse[i * 6 + j][lane] * line->residual[j][lane];
+                delta[i][lane] += model->inverse[i * 6 + j][lane] * model->residual[j][lane];
         }
-    vortices3_sizes(line->y, delta, size);
+    vortices3_sizes(model->y, delta, size);
     for (int i = 0; i < 6; ++i)
-        for (int lane = 0; lane < vortices3_LANES; ++lane) line->y[i][lane] -= delta[i][lane];
+        for (int lane = 0; lane < vortices3_LANES; ++lane) model->y[i][lane] -= delta[i][lane];
 }
 
-/* The largest of the lanes, which are not negative; infinite if one is not finite. As integers, the bits of numbers that are not negative have their
-   order, and those of what is no number are larger. */
+/* The largest of the lanes, none of which is negative; infinite if one is not finite. As integers, the bits of such
+   numbers have their order, and those of what is no number are larger. */
 static double vortices3_largest(const vortices3_lanes size)
 {
     uint64_t bits[8], most = 0;
@@ -1973,27 +1974,27 @@ static double vortices3_remaining(double size, double bend, double bound)
 }
 
 /* The table of a stage, with its matrices or with those of the last pass. */
-static void vortices3_update(vortices3_lanes coef[restrict], vortices3_lines *line, int matrices)
+static void vortices3_update(vortices3_lanes coef[restrict], vortices3_model *model, int matrices)
 {
     if (matrices)
-        vortices3_tabulate(coef, line);
+        vortices3_tabulate(coef, model);
     else
-        vortices3_evaluate_lanes(coef, line->y, line->displacement, line->increment);
+        vortices3_evaluate_lanes(coef, model->y, model->displacement, model->increment);
 }
 
-/* The steps of a block one after the other, each along the lines of its lane. As X, the state with its carry, gains
+/* The steps of a block one after the other, each along the linear model of its lane. As X, the state with its carry, gains
    increment - gain residual, the next residual follows from this one; X itself is added up apart. */
-static void vortices3_chain(vortices3_lines line[1], double x[6], double carry[6])
+static void vortices3_chain(vortices3_model model[1], double x[6], double carry[6])
 {
     double residual[6], sum[6], small[6];
     for (int i = 0; i < 6; ++i) {
-        residual[i] = ((line->y[i][0] - x[i]) + line->displacement[i][0]) - carry[i];
+        residual[i] = ((model->y[i][0] - x[i]) + model->displacement[i][0]) - carry[i];
         sum[i] = x[i];
         small[i] = carry[i];
     }
     for (int k = 0; k < 1 * vortices3_LANES; ++k) {
         const int lane = k / 1, after = (k + 1) / 1 % vortices3_LANES;
-        vortices3_lines *at = &line[k % 1], *next = &line[(k + 1) % 1];
+        vortices3_model *at = &model[k % 1], *next = &model[(k + 1) % 1];
         double even[6] = { 0.0 }, odd[6] = { 0.0 }; /* two sums, so that no long chain of additions is waited for */
         for (int i = 0; i < 6; ++i) {
             at->residual[i][lane] = residual[i];
@@ -2015,8 +2016,8 @@ static void vortices3_chain(vortices3_lines line[1], double x[6], double carry[6
     }
 }
 
-/* Bring the table up to date. */
-static void vortices3_tell(const vortices3_solver *s, vortices3_table *table)
+/* Bring the table up to date: coefficients, and weights that were fitted since. */
+static void vortices3_refresh(const vortices3_solver *s, vortices3_table *table)
 {
     for (int stage = 0; stage < 1; ++stage) {
         if (table->fits[stage] == s->memory[stage].fits) continue;
@@ -2047,7 +2048,7 @@ static void vortices3_foresee(const vortices3_memory *memory, vortices3_lanes we
 
 /* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
    method, to leading order. */
-static void vortices3_march(const vortices3_solver *s, vortices3_table *table, vortices3_lines line[1])
+static void vortices3_march(const vortices3_solver *s, vortices3_table *table, vortices3_model model[1])
 {
     static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
     double x[6], point[6], slope[6], mean[6];
@@ -2064,12 +2065,12 @@ static void vortices3_march(const vortices3_solver *s, vortices3_table *table, v
             }
         }
         for (int i = 0; i < 6; ++i) {
-            line[k % 1].y[i][k / 1] = x[i] + 0.5 * h * mean[i];
+            model[k % 1].y[i][k / 1] = x[i] + 0.5 * h * mean[i];
             x[i] += h * mean[i];
         }
     }
     for (int stage = 0; stage < 1; ++stage) {
-        vortices3_lines *at = &line[stage];
+        vortices3_model *at = &model[stage];
         vortices3_evaluate_lanes(table->coef[stage], at->y, at->displacement, at->increment);
         for (int i = 0; i < 6; ++i) {
             vortices3_EACH_LANE
@@ -2083,24 +2084,24 @@ static void vortices3_march(const vortices3_solver *s, vortices3_table *table, v
    small as after a single step. How many passes that took; 0, and the solver as before, where it takes more than most. */
 static int vortices3_block(vortices3_solver *s, vortices3_table *table, int most)
 {
-    vortices3_lines line[1];
+    vortices3_model model[1];
     vortices3_lanes sizes;
     double x[6], carry[6], value[6], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
-    if (!s->foreseeing) vortices3_march(s, table, line);
+    if (!s->foreseeing) vortices3_march(s, table, model);
     for (int stage = 0; stage < 1; ++stage) {
-        if (s->foreseeing) vortices3_foresee(&s->memory[stage], table->weight[stage], line[stage].y);
-        if (!vortices3_near_lanes(line[stage].y, s->x)) return 0;
+        if (s->foreseeing) vortices3_foresee(&s->memory[stage], table->weight[stage], model[stage].y);
+        if (!vortices3_near_lanes(model[stage].y, s->x)) return 0;
     }
     while (!solved) {
         double size = 0.0;
         const int matrices = previous > 1e-05;
-        for (int stage = 0; stage < 1; ++stage) vortices3_update(table->coef[stage], &line[stage], matrices);
+        for (int stage = 0; stage < 1; ++stage) vortices3_update(table->coef[stage], &model[stage], matrices);
         memcpy(x, s->x, sizeof x);
         memcpy(carry, s->carry, sizeof carry);
-        vortices3_chain(line, x, carry);
+        vortices3_chain(model, x, carry);
         for (int stage = 0; stage < 1; ++stage) {
-            vortices3_correct(&line[stage], sizes);
+            vortices3_correct(&model[stage], sizes);
             const double largest = vortices3_largest(sizes);
             size = largest > size ? largest : size;
         }
@@ -2120,7 +2121,7 @@ static int vortices3_block(vortices3_solver *s, vortices3_table *table, int most
     for (int stage = 0; stage < 1; ++stage) {
         vortices3_memory *memory = &s->memory[stage];
         for (int lane = 0; lane < vortices3_LANES; ++lane) {
-            for (int i = 0; i < 6; ++i) value[i] = line[stage].y[i][lane];
+            for (int i = 0; i < 6; ++i) value[i] = model[stage].y[i][lane];
             vortices3_record(memory, value);
         }
         memory->slow = passes > 1 ? memory->slow + vortices3_LANES : 0;
@@ -2182,7 +2183,7 @@ vortices3_status vortices3_integrate(vortices3_solver *s, double h, size_t steps
     while (status == vortices3_OK && steps > 0) {
         if (steps >= vortices3_LANES && s->pause == 0) vortices3_choose_guess(s, steps);
         if (steps >= vortices3_LANES && s->pause == 0) {
-            vortices3_tell(s, &table);
+            vortices3_refresh(s, &table);
             const int passes = vortices3_block(s, &table, (int)(2 * s->effort + 0.5));
             vortices3_learn_from(s, passes);
             if (passes > 0) steps -= vortices3_LANES;
@@ -2342,24 +2343,24 @@ static void vortices3_group_predict(vortices3_group *group, int stage, vortices3
 
 /* Newton's method for a stage, until the slowest lane is solved. The number of iterations; where that is the most
    allowed, lanes that are not solved leave the group. */
-static int vortices3_group_solve(vortices3_group *group, int stage, vortices3_lines *line)
+static int vortices3_group_solve(vortices3_group *group, int stage, vortices3_model *model)
 {
     vortices3_lanes size, previous, bound;
     double largest = HUGE_VAL, bend = 0.0;
     int iterations = 0, open = 1;
     for (int lane = 0; lane < vortices3_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
-    vortices3_group_predict(group, stage, line->y);
+    vortices3_group_predict(group, stage, model->y);
     for (; open > 0 && iterations < 20; ++iterations) {
         memcpy(previous, size, sizeof size);
-        vortices3_update(group->coef[stage], line, largest > 1e-05);
+        vortices3_update(group->coef[stage], model, largest > 1e-05);
         bend = largest > 1e-05 ? 0.0 : bend + largest;
         for (int i = 0; i < 6; ++i) {
             vortices3_EACH_LANE
             for (int lane = 0; lane < vortices3_LANES; ++lane)
-                line->residual[i][lane] =
-                    ((line->y[i][lane] - group->x[i][lane]) + line->displacement[i][lane]) - group->carry[i][lane];
+                model->residual[i][lane] =
+                    ((model->y[i][lane] - group->x[i][lane]) + model->displacement[i][lane]) - group->carry[i][lane];
         }
-        vortices3_correct(line, size);
+        vortices3_correct(model, size);
         open = vortices3_group_open(group, size, previous, bend, bound);
         largest = vortices3_largest(size);
     }
@@ -2370,18 +2371,18 @@ static int vortices3_group_solve(vortices3_group *group, int stage, vortices3_li
 
 /* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
 static void vortices3_group_advance(vortices3_lanes x[restrict 6], vortices3_lanes carry[restrict 6],
-    vortices3_lines *line)
+    vortices3_model *model)
 {
     for (int i = 0; i < 6; ++i)
         for (int j = 0; j < 6; ++j) {
             vortices3_EACH_LANE
             for (int lane = 0; lane < vortices3_LANES; ++lane)
-                carry[i][lane] -= line->gain[i * 6 + j][lane] * line->residual[j][lane];
+                carry[i][lane] -= model->gain[i * 6 + j][lane] * model->residual[j][lane];
         }
     for (int i = 0; i < 6; ++i) {
         vortices3_EACH_LANE
         for (int lane = 0; lane < vortices3_LANES; ++lane) {
-            const double change = line->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
+            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
             const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
             x[i][lane] = sum + small;
             carry[i][lane] = small - (x[i][lane] - sum);
@@ -2393,17 +2394,17 @@ static void vortices3_group_advance(vortices3_lanes x[restrict 6], vortices3_lan
 static int vortices3_group_step(vortices3_group *group, size_t remaining)
 {
     vortices3_lanes x[6], carry[6];
-    vortices3_lines line;
+    vortices3_model model;
     const int next = (group->latest + 96 - 1) % 96;
     int active = 0, most = 0;
     memcpy(x, group->x, sizeof x);
     memcpy(carry, group->carry, sizeof carry);
     for (int stage = 0; stage < 1; ++stage) {
-        const int iterations = vortices3_group_solve(group, stage, &line);
-        vortices3_group_advance(group->x, group->carry, &line);
-        if (next % 8 == 0 || group->count < 8) vortices3_group_judge(group, stage, line.y);
+        const int iterations = vortices3_group_solve(group, stage, &model);
+        vortices3_group_advance(group->x, group->carry, &model);
+        if (next % 8 == 0 || group->count < 8) vortices3_group_judge(group, stage, model.y);
         if (iterations > most) most = iterations;
-        memcpy(group->past[stage][next], line.y, sizeof line.y);
+        memcpy(group->past[stage][next], model.y, sizeof model.y);
     }
     group->latest = next;
     if (group->count < 96) ++group->count;
@@ -2500,6 +2501,10 @@ vortices3_status vortices3_ensemble(const vortices3_params *params, double *x, s
     }
     return worst;
 }
+
+#if defined(__clang__)
+#pragma clang diagnostic pop
+#endif
 
 /* the Hamiltonian */
 static void vortices3_energy(const vortices3_params *params, const double x[6], double energy[restrict 1])

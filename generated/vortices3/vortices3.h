@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: e9bb316d73b3bc4014e5ae10f2f70752719dcc33403741dfbf7fdc0ffac046f6
+ * body-sha256: fde6483ba9bfcaa338664e7983a93277b97d6d47a486c70d905a14da4532f53c
  */
 #ifndef VORTICES3_H
 #define VORTICES3_H
@@ -71,7 +71,7 @@ typedef struct {
     int pause;      /* steps to make singly before a block is tried */
     int setback;    /* the last pause, halved with every block that succeeds */
     int foreseeing; /* whether blocks are guessed by recurrences */
-    int passes;     /* that the last block took which was not */
+    int passes;     /* that the last block took which was guessed by Runge-Kutta steps */
     size_t doubt;   /* steps to wait before recurrences are tried again */
     size_t retry;   /* steps after which that is */
     double coef[1][3]; /* what depends on params and h only, for each stage */

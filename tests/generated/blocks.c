@@ -52,7 +52,7 @@ static void block_equals_steps(int steps, int foreseeing)
     for (int stage = 0; stage < STAGES && foreseeing; ++stage) F(fit)(&together.memory[stage]);
     together.foreseeing = foreseeing;
     for (int stage = 0; stage < STAGES; ++stage) table.fits[stage] = -1;
-    F(tell)(&together, &table);
+    F(refresh)(&together, &table);
     singles = before = together;
     if (F(block)(&together, &table, 1) == 0) { /* as a rule one pass is too few for a march by Runge-Kutta */
         EXPECT(memcmp(together.x, before.x, sizeof before.x) == 0);

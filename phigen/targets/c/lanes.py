@@ -30,7 +30,7 @@ _MEMBERS = [
     "int pause;      /* steps to make singly before a block is tried */",
     "int setback;    /* the last pause, halved with every block that succeeds */",
     "int foreseeing; /* whether blocks are guessed by recurrences */",
-    "int passes;     /* that the last block took which was not */",
+    "int passes;     /* that the last block took which was guessed by Runge-Kutta steps */",
     "size_t doubt;   /* steps to wait before recurrences are tried again */",
     "size_t retry;   /* steps after which that is */",
 ]
