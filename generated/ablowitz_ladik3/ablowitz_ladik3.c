@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 6b4b82244bed3ab907f15520d732513e367878c4f231358f9c6003be6c6561f2
+ * body-sha256: eb7bf5b6beeaddecae995b3f0dc22105df3024b48c12c88ef3ded73391d0b909
  */
 #include "ablowitz_ladik3.h"
 
@@ -509,8 +509,8 @@ static ablowitz_ladik3_status ablowitz_ladik3_attempt(ablowitz_ladik3_solver *s,
     return ablowitz_ladik3_NO_CONVERGENCE;
 }
 
-/* The 5 stages of one step. A guess from earlier steps may mislead; a stage that fails is tried once more
-   without. If that fails too, the state is as before the step. */
+/* The 5 stages of one step. If one fails, the state is as before the step.
+   As a guess from earlier steps may mislead, a stage that fails is tried once more without. */
 static ablowitz_ladik3_status ablowitz_ladik3_stages(ablowitz_ladik3_solver *s)
 {
     double x[6], carry[6];

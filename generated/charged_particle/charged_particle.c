@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 122123177239e6d145345c9f04702e125742dbbce4052c15aa3c374c54708acf
+ * body-sha256: a40370a631af79d0d91a02754c8cab605dca9d77822256949aaef02af749b338
  */
 #include "charged_particle.h"
 
@@ -503,8 +503,8 @@ static charged_particle_status charged_particle_attempt(charged_particle_solver 
     return charged_particle_NO_CONVERGENCE;
 }
 
-/* The 1 stages of one step. A guess from earlier steps may mislead; a stage that fails is tried once more
-   without. If that fails too, the state is as before the step. */
+/* The 1 stages of one step. If one fails, the state is as before the step.
+   As a guess from earlier steps may mislead, a stage that fails is tried once more without. */
 static charged_particle_status charged_particle_stages(charged_particle_solver *s)
 {
     double x[6], carry[6];

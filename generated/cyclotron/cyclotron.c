@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 0c5fe5455ea7eda293967ac8349516f9c809d1b0b7b48ecba47b979234492721
+ * body-sha256: 82b74301253071506e6fea571ec66c04f3c90a3bb76cda3655f38c4af4f6b0d2
  */
 #include "cyclotron.h"
 
@@ -338,8 +338,8 @@ static cyclotron_status cyclotron_attempt(cyclotron_solver *s, int stage)
     return cyclotron_NO_CONVERGENCE;
 }
 
-/* The 1 stages of one step. A guess from earlier steps may mislead; a stage that fails is tried once more
-   without. If that fails too, the state is as before the step. */
+/* The 1 stages of one step. If one fails, the state is as before the step.
+   As a guess from earlier steps may mislead, a stage that fails is tried once more without. */
 static cyclotron_status cyclotron_stages(cyclotron_solver *s)
 {
     double x[3], carry[3];

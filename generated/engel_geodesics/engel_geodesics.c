@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: b420a98abfb821f3e22df858228d7e2768d369ab2d129e11f2399be6b3434c61
+ * body-sha256: 739e23b7a8c48f7cae1d2cbe1baf4d25a785144a26e7a36ffcbdf1003fd410e4
  */
 #include "engel_geodesics.h"
 
@@ -378,8 +378,8 @@ static engel_geodesics_status engel_geodesics_attempt(engel_geodesics_solver *s,
     return engel_geodesics_NO_CONVERGENCE;
 }
 
-/* The 1 stages of one step. A guess from earlier steps may mislead; a stage that fails is tried once more
-   without. If that fails too, the state is as before the step. */
+/* The 1 stages of one step. If one fails, the state is as before the step.
+   As a guess from earlier steps may mislead, a stage that fails is tried once more without. */
 static engel_geodesics_status engel_geodesics_stages(engel_geodesics_solver *s)
 {
     double x[4], carry[4];

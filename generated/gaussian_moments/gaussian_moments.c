@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: b1c49dde9da7c67a385662500b169ae6702d23ca645520e3f00546a04bef5b28
+ * body-sha256: 37aa6c63abbe855e78ca943eee101931e5edc7b35cbc637f2cab65c9b3e33fb3
  */
 #include "gaussian_moments.h"
 
@@ -485,8 +485,8 @@ static gaussian_moments_status gaussian_moments_attempt(gaussian_moments_solver 
     return gaussian_moments_NO_CONVERGENCE;
 }
 
-/* The 1 stages of one step. A guess from earlier steps may mislead; a stage that fails is tried once more
-   without. If that fails too, the state is as before the step. */
+/* The 1 stages of one step. If one fails, the state is as before the step.
+   As a guess from earlier steps may mislead, a stage that fails is tried once more without. */
 static gaussian_moments_status gaussian_moments_stages(gaussian_moments_solver *s)
 {
     double x[3], carry[3];

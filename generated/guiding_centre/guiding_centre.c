@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 6bf2dc4836955b65601d97ea70f1a3db98141e83c814a6fe0d820c7baaea2bf0
+ * body-sha256: fbe051b1a328e8c2702a25ddecc1e8ff3df6959ce523e35335224596272541df
  */
 #include "guiding_centre.h"
 
@@ -612,8 +612,8 @@ static guiding_centre_status guiding_centre_attempt(guiding_centre_solver *s, in
     return guiding_centre_NO_CONVERGENCE;
 }
 
-/* The 5 stages of one step. A guess from earlier steps may mislead; a stage that fails is tried once more
-   without. If that fails too, the state is as before the step. */
+/* The 5 stages of one step. If one fails, the state is as before the step.
+   As a guess from earlier steps may mislead, a stage that fails is tried once more without. */
 static guiding_centre_status guiding_centre_stages(guiding_centre_solver *s)
 {
     double x[4], carry[4];

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: d59ff947738bf42fcce5c87ba7bea48fd7b72ebcc735f71c56d0cf10a712d124
+ * body-sha256: edbe2dd92ffa9dc52e018e9845a8cb45cbc6cfa76e76fad02746df996b488da8
  */
 #include "harmonic_oscillator.h"
 
@@ -316,8 +316,8 @@ static harmonic_oscillator_status harmonic_oscillator_attempt(harmonic_oscillato
     return harmonic_oscillator_NO_CONVERGENCE;
 }
 
-/* The 1 stages of one step. A guess from earlier steps may mislead; a stage that fails is tried once more
-   without. If that fails too, the state is as before the step. */
+/* The 1 stages of one step. If one fails, the state is as before the step.
+   As a guess from earlier steps may mislead, a stage that fails is tried once more without. */
 static harmonic_oscillator_status harmonic_oscillator_stages(harmonic_oscillator_solver *s)
 {
     double x[2], carry[2];

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: c604aeb17a44b4e22402bf1cb8dc87b0d03b8825c9a5b1d943f37b66c8a6e2c0
+ * body-sha256: ba436ee45944ab827cabec6e64c3c3582b98fe73f2dadd69b32b48028185a501
  */
 #include "henon_heiles.h"
 
@@ -420,8 +420,8 @@ static henon_heiles_status henon_heiles_attempt(henon_heiles_solver *s, int stag
     return henon_heiles_NO_CONVERGENCE;
 }
 
-/* The 1 stages of one step. A guess from earlier steps may mislead; a stage that fails is tried once more
-   without. If that fails too, the state is as before the step. */
+/* The 1 stages of one step. If one fails, the state is as before the step.
+   As a guess from earlier steps may mislead, a stage that fails is tried once more without. */
 static henon_heiles_status henon_heiles_stages(henon_heiles_solver *s)
 {
     double x[4], carry[4];

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 64e039643266a85e8740ba255e13d69dd122594ed78a4ab2ad50698302cf1b4a
+ * body-sha256: e87760b73d554dc0b0a35bb08c963abcca5be28054ca81de3bd6461ac96c1529
  */
 #include "kepler.h"
 
@@ -731,8 +731,8 @@ static kepler_status kepler_attempt(kepler_solver *s, int stage)
     return kepler_NO_CONVERGENCE;
 }
 
-/* The 1 stages of one step. A guess from earlier steps may mislead; a stage that fails is tried once more
-   without. If that fails too, the state is as before the step. */
+/* The 1 stages of one step. If one fails, the state is as before the step.
+   As a guess from earlier steps may mislead, a stage that fails is tried once more without. */
 static kepler_status kepler_stages(kepler_solver *s)
 {
     double x[4], carry[4];

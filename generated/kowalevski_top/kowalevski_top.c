@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: b0588e1b52f617b07b655d4c6bdb55b6fc7d19bba0bd2ef9a96b7102ad25ea6c
+ * body-sha256: e80c57e08d29eff7d942d58d241d472642e2756c85d4868d5185494ad911ce1d
  */
 #include "kowalevski_top.h"
 
@@ -1244,8 +1244,8 @@ static kowalevski_top_status kowalevski_top_attempt(kowalevski_top_solver *s, in
     return kowalevski_top_NO_CONVERGENCE;
 }
 
-/* The 1 stages of one step. A guess from earlier steps may mislead; a stage that fails is tried once more
-   without. If that fails too, the state is as before the step. */
+/* The 1 stages of one step. If one fails, the state is as before the step.
+   As a guess from earlier steps may mislead, a stage that fails is tried once more without. */
 static kowalevski_top_status kowalevski_top_stages(kowalevski_top_solver *s)
 {
     double x[6], carry[6];

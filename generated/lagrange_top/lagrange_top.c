@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 608721bcfead459e759b2c7b91b8b36b3948ccdd8740112d8b71a72c62871838
+ * body-sha256: 040ef07211d61af71fe633563399fc45cce4dc9e08ed4ad881572edb929a4cae
  */
 #include "lagrange_top.h"
 
@@ -838,8 +838,8 @@ static lagrange_top_status lagrange_top_attempt(lagrange_top_solver *s, int stag
     return lagrange_top_NO_CONVERGENCE;
 }
 
-/* The 1 stages of one step. A guess from earlier steps may mislead; a stage that fails is tried once more
-   without. If that fails too, the state is as before the step. */
+/* The 1 stages of one step. If one fails, the state is as before the step.
+   As a guess from earlier steps may mislead, a stage that fails is tried once more without. */
 static lagrange_top_status lagrange_top_stages(lagrange_top_solver *s)
 {
     double x[6], carry[6];

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 594e2983aa73e540846cc86be51c6e48619918b0ceeb85664691d5c0001bbf24
+ * body-sha256: 7987e7dd6bd73197686e815d7951b5431c105de2c03adce3879f318ebbaf488e
  */
 #include "lotka_volterra.h"
 
@@ -354,8 +354,8 @@ static lotka_volterra_status lotka_volterra_attempt(lotka_volterra_solver *s, in
     return lotka_volterra_NO_CONVERGENCE;
 }
 
-/* The 1 stages of one step. A guess from earlier steps may mislead; a stage that fails is tried once more
-   without. If that fails too, the state is as before the step. */
+/* The 1 stages of one step. If one fails, the state is as before the step.
+   As a guess from earlier steps may mislead, a stage that fails is tried once more without. */
 static lotka_volterra_status lotka_volterra_stages(lotka_volterra_solver *s)
 {
     double x[3], carry[3];

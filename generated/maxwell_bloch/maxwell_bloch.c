@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: b675654fe10fa7e205b1d1846dd8b41e91600472116e9c9156d6c0b5f6c9a541
+ * body-sha256: fe9705e323f1edaa15ca4ebdaa6acc39101fc8877ff3713e92bbe40208103e5b
  */
 #include "maxwell_bloch.h"
 
@@ -344,8 +344,8 @@ static maxwell_bloch_status maxwell_bloch_attempt(maxwell_bloch_solver *s, int s
     return maxwell_bloch_NO_CONVERGENCE;
 }
 
-/* The 1 stages of one step. A guess from earlier steps may mislead; a stage that fails is tried once more
-   without. If that fails too, the state is as before the step. */
+/* The 1 stages of one step. If one fails, the state is as before the step.
+   As a guess from earlier steps may mislead, a stage that fails is tried once more without. */
 static maxwell_bloch_status maxwell_bloch_stages(maxwell_bloch_solver *s)
 {
     double x[3], carry[3];

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: b31606a039043dfe2d092e5bb3af9a9b6458d032de87de02404c397f250692da
+ * body-sha256: b9313ceac72420ede8cf8af465ecb66afe7db316a7fd95b8099cf3c7864ecfa6
  */
 #include "nambu_pendulum.h"
 
@@ -433,8 +433,8 @@ static nambu_pendulum_status nambu_pendulum_attempt(nambu_pendulum_solver *s, in
     return nambu_pendulum_NO_CONVERGENCE;
 }
 
-/* The 1 stages of one step. A guess from earlier steps may mislead; a stage that fails is tried once more
-   without. If that fails too, the state is as before the step. */
+/* The 1 stages of one step. If one fails, the state is as before the step.
+   As a guess from earlier steps may mislead, a stage that fails is tried once more without. */
 static nambu_pendulum_status nambu_pendulum_stages(nambu_pendulum_solver *s)
 {
     double x[3], carry[3];

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 7c1131077d0433193ad5f32fa8bd0455cb3fd057ee98818b94be27190b0cec69
+ * body-sha256: 94d03f7006ebfdc1c45ce91cac790f7485155c76f7c1effb071d774765d60b80
  */
 #include "pendulum.h"
 
@@ -349,8 +349,8 @@ static pendulum_status pendulum_attempt(pendulum_solver *s, int stage)
     return pendulum_NO_CONVERGENCE;
 }
 
-/* The 1 stages of one step. A guess from earlier steps may mislead; a stage that fails is tried once more
-   without. If that fails too, the state is as before the step. */
+/* The 1 stages of one step. If one fails, the state is as before the step.
+   As a guess from earlier steps may mislead, a stage that fails is tried once more without. */
 static pendulum_status pendulum_stages(pendulum_solver *s)
 {
     double x[2], carry[2];

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 71b7f66dac42902445fe5f2c37d92348d3e6d5fc16177e4b4d5e611addbde9ee
+ * body-sha256: 5defa8549ea0f665e83321fddab8cd0b09289361b69532238ee09ad0cc363686
  */
 #include "pendulum_euler.h"
 
@@ -74,19 +74,14 @@ static pendulum_euler_status pendulum_euler_attempt(pendulum_euler_solver *s, in
     return pendulum_euler_advance(s, increment, none) ? pendulum_euler_OK : pendulum_euler_NOT_FINITE;
 }
 
-/* The 1 stages of one step. A guess from earlier steps may mislead; a stage that fails is tried once more
-   without. If that fails too, the state is as before the step. */
+/* The 1 stages of one step. If one fails, the state is as before the step. */
 static pendulum_euler_status pendulum_euler_stages(pendulum_euler_solver *s)
 {
     double x[2], carry[2];
     memcpy(x, s->x, sizeof x);
     memcpy(carry, s->carry, sizeof carry);
     for (int stage = 0; stage < 1; ++stage) {
-        pendulum_euler_status status = pendulum_euler_attempt(s, stage);
-        if (status != pendulum_euler_OK && s->memory[stage].count > 0) {
-            memset(&s->memory[stage], 0, sizeof s->memory[stage]);
-            status = pendulum_euler_attempt(s, stage);
-        }
+        const pendulum_euler_status status = pendulum_euler_attempt(s, stage);
         if (status != pendulum_euler_OK) {
             memcpy(s->x, x, sizeof x);
             memcpy(s->carry, carry, sizeof carry);
@@ -115,8 +110,6 @@ static pendulum_euler_status pendulum_euler_set_step(pendulum_euler_solver *s, d
     if (s->ready && memcmp(&h, &s->h, sizeof h) == 0) return pendulum_euler_OK;
     for (int stage = 0; stage < 1; ++stage)
         pendulum_euler_prepare(&s->params, pendulum_euler_fractions[stage] * h, s->coef[stage]);
-    memset(s->memory, 0, sizeof s->memory);
-    for (int stage = 0; stage < 1; ++stage) s->memory[stage].patience = 1000;
     s->h = h;
     s->ready = 1;
     return pendulum_euler_OK;

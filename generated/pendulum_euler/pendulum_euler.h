@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 327073f9a5a8ad5c429c6593ef58fa86cbc95a24fd785fbe887815dd53a7e1c5
+ * body-sha256: d24353fc53e51eaa73095e7d11e2cf7395971fc310bfda782abb540e2d663eba
  */
 #ifndef PENDULUM_EULER_H
 #define PENDULUM_EULER_H
@@ -45,19 +45,6 @@ typedef enum {
     pendulum_euler_BAD_ARGUMENT    /* a null pointer, or a value that is not finite */
 } pendulum_euler_status;
 
-/* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
-   fitted to the last 96 values. They affect speed only. */
-typedef struct {
-    int count;    /* values in past */
-    int order;    /* how many of them the extrapolation uses */
-    int fits;     /* how often weight has been fitted */
-    int fitting;  /* whether the recurrence is the better guess */
-    int slow;     /* how many of the last steps took more than one iteration */
-    int patience; /* how many of those before the recurrence is fitted again */
-    double past[192][pendulum_euler_DIM]; /* values, the latest last */
-    double weight[32][pendulum_euler_DIM][1]; /* of past values, the latest first, for the next value */
-} pendulum_euler_memory;
-
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with pendulum_euler_init. */
 typedef struct {
     double x[pendulum_euler_DIM];     /* the state; read it freely, change it only through pendulum_euler_init */
@@ -68,7 +55,6 @@ typedef struct {
     double h;  /* the step size that coef belongs to */
     int ready; /* whether coef has been computed */
     double coef[1][2]; /* what depends on params and h only, for each stage */
-    pendulum_euler_memory memory[1];
 } pendulum_euler_solver;
 
 /* Start at x0. params may be NULL for the defaults. */

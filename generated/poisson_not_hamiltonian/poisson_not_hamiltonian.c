@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 4485360f7a4be5ed31f934ba2f12ab172799a7e89161f2262f2b405b210cb6cd
+ * body-sha256: 25f9f02016aa1e211bd7523ddc6b83a61ff07d03591b22aba24b1d5a8498f787
  */
 #include "poisson_not_hamiltonian.h"
 
@@ -452,8 +452,8 @@ static poisson_not_hamiltonian_status poisson_not_hamiltonian_attempt(poisson_no
     return poisson_not_hamiltonian_NO_CONVERGENCE;
 }
 
-/* The 1 stages of one step. A guess from earlier steps may mislead; a stage that fails is tried once more
-   without. If that fails too, the state is as before the step. */
+/* The 1 stages of one step. If one fails, the state is as before the step.
+   As a guess from earlier steps may mislead, a stage that fails is tried once more without. */
 static poisson_not_hamiltonian_status poisson_not_hamiltonian_stages(poisson_not_hamiltonian_solver *s)
 {
     double x[3], carry[3];

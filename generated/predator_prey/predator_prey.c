@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 456551e81aedbbba93bd94298ad48ba12abe4ef7b10325fe5e6163874154dd01
+ * body-sha256: a81d1a3a72652338f9a9ce2446ace7777e05ee6fd96328b91220c144fb16f2b3
  */
 #include "predator_prey.h"
 
@@ -349,8 +349,8 @@ static predator_prey_status predator_prey_attempt(predator_prey_solver *s, int s
     return predator_prey_NO_CONVERGENCE;
 }
 
-/* The 1 stages of one step. A guess from earlier steps may mislead; a stage that fails is tried once more
-   without. If that fails too, the state is as before the step. */
+/* The 1 stages of one step. If one fails, the state is as before the step.
+   As a guess from earlier steps may mislead, a stage that fails is tried once more without. */
 static predator_prey_status predator_prey_stages(predator_prey_solver *s)
 {
     double x[2], carry[2];

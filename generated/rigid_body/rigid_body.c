@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: ba391a85fe0b4000af049ce1dcf1ff6b7b6058b078f18667478d20a2fd25bd02
+ * body-sha256: 3310781d247f5265407b1e1dc6bc5521efc5448bec4be8849ee50b6761a4102a
  */
 #include "rigid_body.h"
 
@@ -617,8 +617,8 @@ static rigid_body_status rigid_body_attempt(rigid_body_solver *s, int stage)
     return rigid_body_NO_CONVERGENCE;
 }
 
-/* The 1 stages of one step. A guess from earlier steps may mislead; a stage that fails is tried once more
-   without. If that fails too, the state is as before the step. */
+/* The 1 stages of one step. If one fails, the state is as before the step.
+   As a guess from earlier steps may mislead, a stage that fails is tried once more without. */
 static rigid_body_status rigid_body_stages(rigid_body_solver *s)
 {
     double x[3], carry[3];

@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 8f2a6df2fa6c7496a2fb984eef8d5fc1deed6a8a6478a8b3cda30250f7429ae1
+ * body-sha256: f64fd48667453cd4f7664b28f393ff521610adc5a5d7e56e3285ae1a8bcdc7e0
  */
 #include "rigid_body_dual.h"
 
@@ -503,8 +503,8 @@ static rigid_body_dual_status rigid_body_dual_attempt(rigid_body_dual_solver *s,
     return rigid_body_dual_NO_CONVERGENCE;
 }
 
-/* The 1 stages of one step. A guess from earlier steps may mislead; a stage that fails is tried once more
-   without. If that fails too, the state is as before the step. */
+/* The 1 stages of one step. If one fails, the state is as before the step.
+   As a guess from earlier steps may mislead, a stage that fails is tried once more without. */
 static rigid_body_dual_status rigid_body_dual_stages(rigid_body_dual_solver *s)
 {
     double x[3], carry[3];

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 792a927d83565eabe26e3f06baa942f494581b7c57bd720b90178386e76f45e0
+ * body-sha256: 73bcd5bdc437e72cc28f3d2b21e90cb3846db144c3924edf2801c02850adb654
  */
 #include "rigid_body_paper.h"
 
@@ -459,8 +459,8 @@ static rigid_body_paper_status rigid_body_paper_attempt(rigid_body_paper_solver 
     return rigid_body_paper_NO_CONVERGENCE;
 }
 
-/* The 1 stages of one step. A guess from earlier steps may mislead; a stage that fails is tried once more
-   without. If that fails too, the state is as before the step. */
+/* The 1 stages of one step. If one fails, the state is as before the step.
+   As a guess from earlier steps may mislead, a stage that fails is tried once more without. */
 static rigid_body_paper_status rigid_body_paper_stages(rigid_body_paper_solver *s)
 {
     double x[3], carry[3];

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: c0d93d55805939cc89b417cc22d86615cfe29e7299da63a1cc003ea2e776b7a1
+ * body-sha256: 679f3e8b2b0099963ebacf9d0414b26a004f778adef94b1fd3eb966452f1339a
  */
 #include "sir_epidemic.h"
 
@@ -433,8 +433,8 @@ static sir_epidemic_status sir_epidemic_attempt(sir_epidemic_solver *s, int stag
     return sir_epidemic_NO_CONVERGENCE;
 }
 
-/* The 1 stages of one step. A guess from earlier steps may mislead; a stage that fails is tried once more
-   without. If that fails too, the state is as before the step. */
+/* The 1 stages of one step. If one fails, the state is as before the step.
+   As a guess from earlier steps may mislead, a stage that fails is tried once more without. */
 static sir_epidemic_status sir_epidemic_stages(sir_epidemic_solver *s)
 {
     double x[3], carry[3];

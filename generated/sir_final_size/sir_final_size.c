@@ -12,7 +12,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 812fda3ce981d08692097441db15606ef2c2db396bb5143bd9113fa34c91a2f5
+ * body-sha256: 1ed9611753e4b1f0638363deda02254b7a7179336c1df5de56cae43b09d0b2dd
  */
 #include "sir_final_size.h"
 
@@ -435,8 +435,8 @@ static sir_final_size_status sir_final_size_attempt(sir_final_size_solver *s, in
     return sir_final_size_NO_CONVERGENCE;
 }
 
-/* The 1 stages of one step. A guess from earlier steps may mislead; a stage that fails is tried once more
-   without. If that fails too, the state is as before the step. */
+/* The 1 stages of one step. If one fails, the state is as before the step.
+   As a guess from earlier steps may mislead, a stage that fails is tried once more without. */
 static sir_final_size_status sir_final_size_stages(sir_final_size_solver *s)
 {
     double x[3], carry[3];

@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: e6dee6b1eecf14158cd242690c7e7c4a07e00c95e2aa10e9ac570dc7c5412092
+ * body-sha256: 01d9498f30683d3645673da57f7a9381c0c844ad265912c6fa53bde2d8bc1155
  */
 #include "sklyanin_gyrostat.h"
 
@@ -618,8 +618,8 @@ static sklyanin_gyrostat_status sklyanin_gyrostat_attempt(sklyanin_gyrostat_solv
     return sklyanin_gyrostat_NO_CONVERGENCE;
 }
 
-/* The 1 stages of one step. A guess from earlier steps may mislead; a stage that fails is tried once more
-   without. If that fails too, the state is as before the step. */
+/* The 1 stages of one step. If one fails, the state is as before the step.
+   As a guess from earlier steps may mislead, a stage that fails is tried once more without. */
 static sklyanin_gyrostat_status sklyanin_gyrostat_stages(sklyanin_gyrostat_solver *s)
 {
     double x[4], carry[4];

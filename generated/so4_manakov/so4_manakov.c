@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 3e6c665545e3086d4addc7e7ec6396ff97aa1ab93dd7b7aa641f88779a80eb47
+ * body-sha256: 5bb3aacdacc43f3c2ecbb7d515b1d1645646c18e0ed201ef862de424f38c95d4
  */
 #include "so4_manakov.h"
 
@@ -924,8 +924,8 @@ static so4_manakov_status so4_manakov_attempt(so4_manakov_solver *s, int stage)
     return so4_manakov_NO_CONVERGENCE;
 }
 
-/* The 1 stages of one step. A guess from earlier steps may mislead; a stage that fails is tried once more
-   without. If that fails too, the state is as before the step. */
+/* The 1 stages of one step. If one fails, the state is as before the step.
+   As a guess from earlier steps may mislead, a stage that fails is tried once more without. */
 static so4_manakov_status so4_manakov_stages(so4_manakov_solver *s)
 {
     double x[6], carry[6];

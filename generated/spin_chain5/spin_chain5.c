@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 6d37ebff329ca64f444354836297c92d9b3961f0fbbc6a9cb97e34f6457da636
+ * body-sha256: ba9b18ce7587dd0a2e98e7a75ee9eb3525f7048c047d3d3fe6cb443a0b287675
  */
 #include "spin_chain5.h"
 
@@ -1902,8 +1902,8 @@ static spin_chain5_status spin_chain5_attempt(spin_chain5_solver *s, int stage)
     return spin_chain5_NO_CONVERGENCE;
 }
 
-/* The 1 stages of one step. A guess from earlier steps may mislead; a stage that fails is tried once more
-   without. If that fails too, the state is as before the step. */
+/* The 1 stages of one step. If one fails, the state is as before the step.
+   As a guess from earlier steps may mislead, a stage that fails is tried once more without. */
 static spin_chain5_status spin_chain5_stages(spin_chain5_solver *s)
 {
     double x[15], carry[15];

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 32a721362da2b4685a62c483f10442295918b3afaaa80c43ed15e1243139709b
+ * body-sha256: 8fd185bb8c62a4d6c264653110a181c4b2c075a6fc42808afe0ccdab8ec3e7d6
  */
 #include "toda3.h"
 
@@ -534,8 +534,8 @@ static toda3_status toda3_attempt(toda3_solver *s, int stage)
     return toda3_NO_CONVERGENCE;
 }
 
-/* The 1 stages of one step. A guess from earlier steps may mislead; a stage that fails is tried once more
-   without. If that fails too, the state is as before the step. */
+/* The 1 stages of one step. If one fails, the state is as before the step.
+   As a guess from earlier steps may mislead, a stage that fails is tried once more without. */
 static toda3_status toda3_stages(toda3_solver *s)
 {
     double x[5], carry[5];

@@ -12,7 +12,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: b518b77a0efd945696c282479f07d1d36a8dde886e9929180379efb79401394a
+ * body-sha256: c47d05f8883c086f73d4a3f827b25106da2a4ffbbf69a2b5c5d9c727cef68783
  */
 #include "toda3_quadratic.h"
 
@@ -498,8 +498,8 @@ static toda3_quadratic_status toda3_quadratic_attempt(toda3_quadratic_solver *s,
     return toda3_quadratic_NO_CONVERGENCE;
 }
 
-/* The 1 stages of one step. A guess from earlier steps may mislead; a stage that fails is tried once more
-   without. If that fails too, the state is as before the step. */
+/* The 1 stages of one step. If one fails, the state is as before the step.
+   As a guess from earlier steps may mislead, a stage that fails is tried once more without. */
 static toda3_quadratic_status toda3_quadratic_stages(toda3_quadratic_solver *s)
 {
     double x[5], carry[5];

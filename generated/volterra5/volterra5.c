@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 1ce06be9803bfec3346d40ecea1eb515de9d49f259fe7c888314416a959d377c
+ * body-sha256: ee6c177de56bb6aa16e7bd0dd73f4a52e3cdb741bf45b9edfeda8b12c302704e
  */
 #include "volterra5.h"
 
@@ -444,8 +444,8 @@ static volterra5_status volterra5_attempt(volterra5_solver *s, int stage)
     return volterra5_NO_CONVERGENCE;
 }
 
-/* The 1 stages of one step. A guess from earlier steps may mislead; a stage that fails is tried once more
-   without. If that fails too, the state is as before the step. */
+/* The 1 stages of one step. If one fails, the state is as before the step.
+   As a guess from earlier steps may mislead, a stage that fails is tried once more without. */
 static volterra5_status volterra5_stages(volterra5_solver *s)
 {
     double x[5], carry[5];

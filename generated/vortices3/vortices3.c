@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: f073430fb57b538ee6b4c604be21d73e4a7152e435f024d7ace9183d9c8c5f1d
+ * body-sha256: 0222e94c77583e9bfc68c2aa36186a7ff52da1dada0689c327b9170431408177
  */
 #include "vortices3.h"
 
@@ -952,8 +952,8 @@ static vortices3_status vortices3_attempt(vortices3_solver *s, int stage)
     return vortices3_NO_CONVERGENCE;
 }
 
-/* The 1 stages of one step. A guess from earlier steps may mislead; a stage that fails is tried once more
-   without. If that fails too, the state is as before the step. */
+/* The 1 stages of one step. If one fails, the state is as before the step.
+   As a guess from earlier steps may mislead, a stage that fails is tried once more without. */
 static vortices3_status vortices3_stages(vortices3_solver *s)
 {
     double x[6], carry[6];

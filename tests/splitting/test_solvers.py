@@ -5,12 +5,13 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from support import TARGETS, compile_text, compiled, setting, solver
+from support import COMMAND, TARGETS, compile_text, compiled, run, setting, solver, tool, write
 
 from phigen.analysis import measures
 from phigen.analysis.methods import of_solver
 from phigen.analysis.proof import examine
 from phigen.analysis.verification import verify
+from phigen.compiler import emit
 from phigen.errors import CheckError, StepError
 from phigen.scheme.alternation import find
 from phigen.scheme.splitting import build_splitting
@@ -130,3 +131,22 @@ def test_refuted_flows_are_not_compiled(monkeypatch):
     assert [s.name[:19] for s in examine(found.spec, scheme="splitting").refuted] == ["the flow Φ of H_2: "]
     with pytest.raises(CheckError, match="H_2"):
         proof.compile_proved(found.spec, scheme="splitting")
+
+
+@pytest.mark.parametrize("compiler", ["gcc", "clang"])
+@pytest.mark.parametrize("name", SYSTEMS)
+def test_c_compiles_without_a_warning(name, compiler, tmp_path):
+    write(tmp_path, emit(compiled(name, 4, "splitting").program, "c", COMMAND))
+    flags = [
+        "-std=c99",
+        "-Wall",
+        "-Wextra",
+        "-Wpedantic",
+        "-Wconversion",
+        "-Wdouble-promotion",
+        "-Wshadow",
+        "-Werror",
+        "-O1",
+        "-c",
+    ]
+    run([tool(compiler), *flags, f"{name}.c", "-o", f"{name}.o"], tmp_path)

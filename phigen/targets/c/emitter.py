@@ -78,6 +78,7 @@ def _values(program: Program) -> dict[str, object]:
         "coefficients": max(1, program.coefficients),
         "history": HISTORY,
         **_memory_values(program),
+        **_memory_lines(program),
         "coordinates": ", ".join(f"{c} = x[{i}]" for i, c in enumerate(program.coordinates)),
         "casimirs": ", ".join(f"{c} = out[{i}]" for i, c in enumerate(program.casimirs)) or "none",
         "members": [
@@ -107,6 +108,32 @@ def _memory_values(program: Program) -> dict[str, object]:
         "window": 2 * (fitted * WINDOW // FITTED // 2),
         "ahead": ahead,
         "horizon": "the next values" if ahead > 1 else "the next value",
+    }
+
+
+def _memory_lines(program: Program) -> dict[str, object]:
+    """The memory of the inner solve, where there is one."""
+    name, stages = program.name, len(program.fractions)
+    if program.driver in ("explicit", "splitting"):
+        nothing = dict.fromkeys(("memory_type", "memory_members", "memory_reset", "retry"), ())
+        return {**nothing, "retry_said": "", "attempted": f"const {name}_status status", "remembered_value": "at.x"}
+    head = {"NAME": name, **_memory_values(program)}
+    return {
+        "memory_type": [*render("c", "memory.h", head).splitlines(), ""],
+        "memory_members": [f"{name}_memory memory[{stages}];"],
+        "memory_reset": [
+            "memset(s->memory, 0, sizeof s->memory);",
+            f"for (int stage = 0; stage < {stages}; ++stage) s->memory[stage].patience = {REPAY};",
+        ],
+        "retry": [
+            f"if (status != {name}_OK && s->memory[stage].count > 0) {{",
+            "    memset(&s->memory[stage], 0, sizeof s->memory[stage]);",
+            f"    status = {name}_attempt(s, stage);",
+            "}",
+        ],
+        "retry_said": "\n   As a guess from earlier steps may mislead, a stage that fails is tried once more without.",
+        "remembered_value": "s->memory[k].past[s->memory[k].count - 1]",
+        "attempted": f"{name}_status status",
     }
 
 
@@ -183,7 +210,8 @@ def _body(program: Program) -> str:
         if "eliminate" in kernels:
             pieces += [static("eliminate"), _render("unrolled.c", values)]
         pieces += [_render("remember.c", values), _render("train.c", values), _render("learn.c", values)]
-    pieces.append(_render("advance.c", values))
+    if program.driver != "splitting" or program.extras.tangent:
+        pieces.append(_render("advance.c", values))
     if program.path:
         unused = [] if reads_coefficients(program.path) else ["(void)coef;"]
         piece = values | statements(program, program.path, _path_syntax(program)) | {"unused": unused}
