@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: eb7bf5b6beeaddecae995b3f0dc22105df3024b48c12c88ef3ded73391d0b909
+ * body-sha256: 94ae6281ea85d98d414c5f75e94575caeb2575144bfdb5a733bfdc85a195e5af
  */
 #include "ablowitz_ladik3.h"
 
@@ -249,13 +249,18 @@ static void ablowitz_ladik3_train(ablowitz_ladik3_memory *memory, int component)
         }
 }
 
+/* Drop what is old, if so many values would not fit into the history. */
+static void ablowitz_ladik3_make_room(ablowitz_ladik3_memory *memory, int values)
+{
+    if (memory->count + values <= 192) return;
+    memmove(memory->past, memory->past + memory->count - 96, 96 * sizeof memory->past[0]);
+    memory->count = 96;
+}
+
 /* Add a value to the history. */
 static void ablowitz_ladik3_record(ablowitz_ladik3_memory *memory, const double value[6])
 {
-    if (memory->count == 192) {
-        memmove(memory->past, memory->past + 192 - 96, 96 * sizeof memory->past[0]);
-        memory->count = 96;
-    }
+    ablowitz_ladik3_make_room(memory, 1);
     memcpy(memory->past[memory->count++], value, 6 * sizeof value[0]);
 }
 

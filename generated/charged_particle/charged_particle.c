@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: a40370a631af79d0d91a02754c8cab605dca9d77822256949aaef02af749b338
+ * body-sha256: 5bcb83e9069bfa4eb615f9c415a8d5cdb769db328d8c064c67d5763eaea075ec
  */
 #include "charged_particle.h"
 
@@ -265,13 +265,18 @@ static void charged_particle_train(charged_particle_memory *memory, int componen
         }
 }
 
+/* Drop what is old, if so many values would not fit into the history. */
+static void charged_particle_make_room(charged_particle_memory *memory, int values)
+{
+    if (memory->count + values <= 192) return;
+    memmove(memory->past, memory->past + memory->count - 96, 96 * sizeof memory->past[0]);
+    memory->count = 96;
+}
+
 /* Add a value to the history. */
 static void charged_particle_record(charged_particle_memory *memory, const double value[6])
 {
-    if (memory->count == 192) {
-        memmove(memory->past, memory->past + 192 - 96, 96 * sizeof memory->past[0]);
-        memory->count = 96;
-    }
+    charged_particle_make_room(memory, 1);
     memcpy(memory->past[memory->count++], value, 6 * sizeof value[0]);
 }
 

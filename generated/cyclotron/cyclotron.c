@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 82b74301253071506e6fea571ec66c04f3c90a3bb76cda3655f38c4af4f6b0d2
+ * body-sha256: ebbe4e75cc93469f74989f11a52aa8d83dc65d6bc88fee6328e77c29c25b20d6
  */
 #include "cyclotron.h"
 
@@ -240,13 +240,18 @@ static void cyclotron_train(cyclotron_memory *memory, int component)
         }
 }
 
+/* Drop what is old, if so many values would not fit into the history. */
+static void cyclotron_make_room(cyclotron_memory *memory, int values)
+{
+    if (memory->count + values <= 192) return;
+    memmove(memory->past, memory->past + memory->count - 96, 96 * sizeof memory->past[0]);
+    memory->count = 96;
+}
+
 /* Add a value to the history. */
 static void cyclotron_record(cyclotron_memory *memory, const double value[3])
 {
-    if (memory->count == 192) {
-        memmove(memory->past, memory->past + 192 - 96, 96 * sizeof memory->past[0]);
-        memory->count = 96;
-    }
+    cyclotron_make_room(memory, 1);
     memcpy(memory->past[memory->count++], value, 3 * sizeof value[0]);
 }
 
@@ -704,6 +709,15 @@ static void cyclotron_foresee(const cyclotron_memory *memory, cyclotron_lanes we
     }
 }
 
+/* cyclotron_record for the values of all lanes, one after the other. */
+static void cyclotron_record_lanes(cyclotron_memory *memory, cyclotron_lanes y[restrict 3])
+{
+    cyclotron_make_room(memory, cyclotron_LANES);
+    for (int lane = 0; lane < cyclotron_LANES; ++lane)
+        for (int i = 0; i < 3; ++i) memory->past[memory->count + lane][i] = y[i][lane];
+    memory->count += cyclotron_LANES;
+}
+
 /* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
    method, to leading order. */
 static void cyclotron_march(const cyclotron_solver *s, cyclotron_table *table, cyclotron_model model[1])
@@ -744,7 +758,7 @@ static int cyclotron_block(cyclotron_solver *s, cyclotron_table *table, int most
 {
     cyclotron_model model[1];
     cyclotron_lanes sizes;
-    double x[3], carry[3], value[3], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
+    double x[3], carry[3], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
     if (!s->foreseeing) cyclotron_march(s, table, model);
     for (int stage = 0; stage < 1; ++stage) {
@@ -778,10 +792,7 @@ static int cyclotron_block(cyclotron_solver *s, cyclotron_table *table, int most
     s->steps += cyclotron_LANES;
     for (int stage = 0; stage < 1; ++stage) {
         cyclotron_memory *memory = &s->memory[stage];
-        for (int lane = 0; lane < cyclotron_LANES; ++lane) {
-            for (int i = 0; i < 3; ++i) value[i] = model[stage].y[i][lane];
-            cyclotron_record(memory, value);
-        }
+        cyclotron_record_lanes(memory, model[stage].y);
         memory->slow = passes > 1 ? memory->slow + cyclotron_LANES : 0;
         if (memory->slow > memory->patience && s->foreseeing) cyclotron_fit(memory);
     }

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 739e23b7a8c48f7cae1d2cbe1baf4d25a785144a26e7a36ffcbdf1003fd410e4
+ * body-sha256: 2ff2a1b6e5752db5a2366eabdc689fad8b07c69e0ac1a3954c82edbf134c9820
  */
 #include "engel_geodesics.h"
 
@@ -280,13 +280,18 @@ static void engel_geodesics_train(engel_geodesics_memory *memory, int component)
         }
 }
 
+/* Drop what is old, if so many values would not fit into the history. */
+static void engel_geodesics_make_room(engel_geodesics_memory *memory, int values)
+{
+    if (memory->count + values <= 192) return;
+    memmove(memory->past, memory->past + memory->count - 96, 96 * sizeof memory->past[0]);
+    memory->count = 96;
+}
+
 /* Add a value to the history. */
 static void engel_geodesics_record(engel_geodesics_memory *memory, const double value[4])
 {
-    if (memory->count == 192) {
-        memmove(memory->past, memory->past + 192 - 96, 96 * sizeof memory->past[0]);
-        memory->count = 96;
-    }
+    engel_geodesics_make_room(memory, 1);
     memcpy(memory->past[memory->count++], value, 4 * sizeof value[0]);
 }
 
@@ -816,6 +821,15 @@ static void engel_geodesics_foresee(const engel_geodesics_memory *memory, engel_
     }
 }
 
+/* engel_geodesics_record for the values of all lanes, one after the other. */
+static void engel_geodesics_record_lanes(engel_geodesics_memory *memory, engel_geodesics_lanes y[restrict 4])
+{
+    engel_geodesics_make_room(memory, engel_geodesics_LANES);
+    for (int lane = 0; lane < engel_geodesics_LANES; ++lane)
+        for (int i = 0; i < 4; ++i) memory->past[memory->count + lane][i] = y[i][lane];
+    memory->count += engel_geodesics_LANES;
+}
+
 /* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
    method, to leading order. */
 static void engel_geodesics_march(const engel_geodesics_solver *s, engel_geodesics_table *table, engel_geodesics_model model[1])
@@ -856,7 +870,7 @@ static int engel_geodesics_block(engel_geodesics_solver *s, engel_geodesics_tabl
 {
     engel_geodesics_model model[1];
     engel_geodesics_lanes sizes;
-    double x[4], carry[4], value[4], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
+    double x[4], carry[4], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
     if (!s->foreseeing) engel_geodesics_march(s, table, model);
     for (int stage = 0; stage < 1; ++stage) {
@@ -890,10 +904,7 @@ static int engel_geodesics_block(engel_geodesics_solver *s, engel_geodesics_tabl
     s->steps += engel_geodesics_LANES;
     for (int stage = 0; stage < 1; ++stage) {
         engel_geodesics_memory *memory = &s->memory[stage];
-        for (int lane = 0; lane < engel_geodesics_LANES; ++lane) {
-            for (int i = 0; i < 4; ++i) value[i] = model[stage].y[i][lane];
-            engel_geodesics_record(memory, value);
-        }
+        engel_geodesics_record_lanes(memory, model[stage].y);
         memory->slow = passes > 1 ? memory->slow + engel_geodesics_LANES : 0;
         if (memory->slow > memory->patience && s->foreseeing) engel_geodesics_fit(memory);
     }

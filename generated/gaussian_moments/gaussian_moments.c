@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 37aa6c63abbe855e78ca943eee101931e5edc7b35cbc637f2cab65c9b3e33fb3
+ * body-sha256: 3cae001b47d7adf5db523f99d7fecdb7318171be52b1d66edb63962170685647
  */
 #include "gaussian_moments.h"
 
@@ -387,13 +387,18 @@ static void gaussian_moments_train(gaussian_moments_memory *memory, int componen
         }
 }
 
+/* Drop what is old, if so many values would not fit into the history. */
+static void gaussian_moments_make_room(gaussian_moments_memory *memory, int values)
+{
+    if (memory->count + values <= 192) return;
+    memmove(memory->past, memory->past + memory->count - 96, 96 * sizeof memory->past[0]);
+    memory->count = 96;
+}
+
 /* Add a value to the history. */
 static void gaussian_moments_record(gaussian_moments_memory *memory, const double value[3])
 {
-    if (memory->count == 192) {
-        memmove(memory->past, memory->past + 192 - 96, 96 * sizeof memory->past[0]);
-        memory->count = 96;
-    }
+    gaussian_moments_make_room(memory, 1);
     memcpy(memory->past[memory->count++], value, 3 * sizeof value[0]);
 }
 
@@ -944,6 +949,15 @@ static void gaussian_moments_foresee(const gaussian_moments_memory *memory, gaus
     }
 }
 
+/* gaussian_moments_record for the values of all lanes, one after the other. */
+static void gaussian_moments_record_lanes(gaussian_moments_memory *memory, gaussian_moments_lanes y[restrict 3])
+{
+    gaussian_moments_make_room(memory, gaussian_moments_LANES);
+    for (int lane = 0; lane < gaussian_moments_LANES; ++lane)
+        for (int i = 0; i < 3; ++i) memory->past[memory->count + lane][i] = y[i][lane];
+    memory->count += gaussian_moments_LANES;
+}
+
 /* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
    method, to leading order. */
 static void gaussian_moments_march(const gaussian_moments_solver *s, gaussian_moments_table *table, gaussian_moments_model model[1])
@@ -984,7 +998,7 @@ static int gaussian_moments_block(gaussian_moments_solver *s, gaussian_moments_t
 {
     gaussian_moments_model model[1];
     gaussian_moments_lanes sizes;
-    double x[3], carry[3], value[3], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
+    double x[3], carry[3], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
     if (!s->foreseeing) gaussian_moments_march(s, table, model);
     for (int stage = 0; stage < 1; ++stage) {
@@ -1018,10 +1032,7 @@ static int gaussian_moments_block(gaussian_moments_solver *s, gaussian_moments_t
     s->steps += gaussian_moments_LANES;
     for (int stage = 0; stage < 1; ++stage) {
         gaussian_moments_memory *memory = &s->memory[stage];
-        for (int lane = 0; lane < gaussian_moments_LANES; ++lane) {
-            for (int i = 0; i < 3; ++i) value[i] = model[stage].y[i][lane];
-            gaussian_moments_record(memory, value);
-        }
+        gaussian_moments_record_lanes(memory, model[stage].y);
         memory->slow = passes > 1 ? memory->slow + gaussian_moments_LANES : 0;
         if (memory->slow > memory->patience && s->foreseeing) gaussian_moments_fit(memory);
     }

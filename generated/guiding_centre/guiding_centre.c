@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: fbe051b1a328e8c2702a25ddecc1e8ff3df6959ce523e35335224596272541df
+ * body-sha256: 7181b3232f4abbb4af726124e739b63640dc191e0d0cb95238bb59853e3e0299
  */
 #include "guiding_centre.h"
 
@@ -260,13 +260,18 @@ static void guiding_centre_train(guiding_centre_memory *memory, int component)
         }
 }
 
+/* Drop what is old, if so many values would not fit into the history. */
+static void guiding_centre_make_room(guiding_centre_memory *memory, int values)
+{
+    if (memory->count + values <= 192) return;
+    memmove(memory->past, memory->past + memory->count - 96, 96 * sizeof memory->past[0]);
+    memory->count = 96;
+}
+
 /* Add a value to the history. */
 static void guiding_centre_record(guiding_centre_memory *memory, const double value[4])
 {
-    if (memory->count == 192) {
-        memmove(memory->past, memory->past + 192 - 96, 96 * sizeof memory->past[0]);
-        memory->count = 96;
-    }
+    guiding_centre_make_room(memory, 1);
     memcpy(memory->past[memory->count++], value, 4 * sizeof value[0]);
 }
 

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: edbe2dd92ffa9dc52e018e9845a8cb45cbc6cfa76e76fad02746df996b488da8
+ * body-sha256: 4aff9e530b7e06ae26f9cc0b78dfc6492b8a81a25a59be1f056f846ccc14ce9d
  */
 #include "harmonic_oscillator.h"
 
@@ -218,13 +218,18 @@ static void harmonic_oscillator_train(harmonic_oscillator_memory *memory, int co
         }
 }
 
+/* Drop what is old, if so many values would not fit into the history. */
+static void harmonic_oscillator_make_room(harmonic_oscillator_memory *memory, int values)
+{
+    if (memory->count + values <= 192) return;
+    memmove(memory->past, memory->past + memory->count - 96, 96 * sizeof memory->past[0]);
+    memory->count = 96;
+}
+
 /* Add a value to the history. */
 static void harmonic_oscillator_record(harmonic_oscillator_memory *memory, const double value[2])
 {
-    if (memory->count == 192) {
-        memmove(memory->past, memory->past + 192 - 96, 96 * sizeof memory->past[0]);
-        memory->count = 96;
-    }
+    harmonic_oscillator_make_room(memory, 1);
     memcpy(memory->past[memory->count++], value, 2 * sizeof value[0]);
 }
 
@@ -641,6 +646,15 @@ static void harmonic_oscillator_foresee(const harmonic_oscillator_memory *memory
     }
 }
 
+/* harmonic_oscillator_record for the values of all lanes, one after the other. */
+static void harmonic_oscillator_record_lanes(harmonic_oscillator_memory *memory, harmonic_oscillator_lanes y[restrict 2])
+{
+    harmonic_oscillator_make_room(memory, harmonic_oscillator_LANES);
+    for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane)
+        for (int i = 0; i < 2; ++i) memory->past[memory->count + lane][i] = y[i][lane];
+    memory->count += harmonic_oscillator_LANES;
+}
+
 /* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
    method, to leading order. */
 static void harmonic_oscillator_march(const harmonic_oscillator_solver *s, harmonic_oscillator_table *table, harmonic_oscillator_model model[1])
@@ -681,7 +695,7 @@ static int harmonic_oscillator_block(harmonic_oscillator_solver *s, harmonic_osc
 {
     harmonic_oscillator_model model[1];
     harmonic_oscillator_lanes sizes;
-    double x[2], carry[2], value[2], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
+    double x[2], carry[2], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
     if (!s->foreseeing) harmonic_oscillator_march(s, table, model);
     for (int stage = 0; stage < 1; ++stage) {
@@ -715,10 +729,7 @@ static int harmonic_oscillator_block(harmonic_oscillator_solver *s, harmonic_osc
     s->steps += harmonic_oscillator_LANES;
     for (int stage = 0; stage < 1; ++stage) {
         harmonic_oscillator_memory *memory = &s->memory[stage];
-        for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane) {
-            for (int i = 0; i < 2; ++i) value[i] = model[stage].y[i][lane];
-            harmonic_oscillator_record(memory, value);
-        }
+        harmonic_oscillator_record_lanes(memory, model[stage].y);
         memory->slow = passes > 1 ? memory->slow + harmonic_oscillator_LANES : 0;
         if (memory->slow > memory->patience && s->foreseeing) harmonic_oscillator_fit(memory);
     }

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: ba436ee45944ab827cabec6e64c3c3582b98fe73f2dadd69b32b48028185a501
+ * body-sha256: 19238f4b92f1d023ad66a12d61c909106068eaeca6191488f1702ad2edae78b3
  */
 #include "henon_heiles.h"
 
@@ -322,13 +322,18 @@ static void henon_heiles_train(henon_heiles_memory *memory, int component)
         }
 }
 
+/* Drop what is old, if so many values would not fit into the history. */
+static void henon_heiles_make_room(henon_heiles_memory *memory, int values)
+{
+    if (memory->count + values <= 192) return;
+    memmove(memory->past, memory->past + memory->count - 96, 96 * sizeof memory->past[0]);
+    memory->count = 96;
+}
+
 /* Add a value to the history. */
 static void henon_heiles_record(henon_heiles_memory *memory, const double value[4])
 {
-    if (memory->count == 192) {
-        memmove(memory->past, memory->past + 192 - 96, 96 * sizeof memory->past[0]);
-        memory->count = 96;
-    }
+    henon_heiles_make_room(memory, 1);
     memcpy(memory->past[memory->count++], value, 4 * sizeof value[0]);
 }
 
@@ -873,6 +878,15 @@ static void henon_heiles_foresee(const henon_heiles_memory *memory, henon_heiles
     }
 }
 
+/* henon_heiles_record for the values of all lanes, one after the other. */
+static void henon_heiles_record_lanes(henon_heiles_memory *memory, henon_heiles_lanes y[restrict 4])
+{
+    henon_heiles_make_room(memory, henon_heiles_LANES);
+    for (int lane = 0; lane < henon_heiles_LANES; ++lane)
+        for (int i = 0; i < 4; ++i) memory->past[memory->count + lane][i] = y[i][lane];
+    memory->count += henon_heiles_LANES;
+}
+
 /* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
    method, to leading order. */
 static void henon_heiles_march(const henon_heiles_solver *s, henon_heiles_table *table, henon_heiles_model model[1])
@@ -913,7 +927,7 @@ static int henon_heiles_block(henon_heiles_solver *s, henon_heiles_table *table,
 {
     henon_heiles_model model[1];
     henon_heiles_lanes sizes;
-    double x[4], carry[4], value[4], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
+    double x[4], carry[4], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
     if (!s->foreseeing) henon_heiles_march(s, table, model);
     for (int stage = 0; stage < 1; ++stage) {
@@ -947,10 +961,7 @@ static int henon_heiles_block(henon_heiles_solver *s, henon_heiles_table *table,
     s->steps += henon_heiles_LANES;
     for (int stage = 0; stage < 1; ++stage) {
         henon_heiles_memory *memory = &s->memory[stage];
-        for (int lane = 0; lane < henon_heiles_LANES; ++lane) {
-            for (int i = 0; i < 4; ++i) value[i] = model[stage].y[i][lane];
-            henon_heiles_record(memory, value);
-        }
+        henon_heiles_record_lanes(memory, model[stage].y);
         memory->slow = passes > 1 ? memory->slow + henon_heiles_LANES : 0;
         if (memory->slow > memory->patience && s->foreseeing) henon_heiles_fit(memory);
     }

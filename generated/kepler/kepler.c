@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: e87760b73d554dc0b0a35bb08c963abcca5be28054ca81de3bd6461ac96c1529
+ * body-sha256: e5e9d50e0eef2a53641b2766a6085acb27f9efb04e12b2cce1ad7c34ef8df3c6
  */
 #include "kepler.h"
 
@@ -633,13 +633,18 @@ static void kepler_train(kepler_memory *memory, int component)
         }
 }
 
+/* Drop what is old, if so many values would not fit into the history. */
+static void kepler_make_room(kepler_memory *memory, int values)
+{
+    if (memory->count + values <= 192) return;
+    memmove(memory->past, memory->past + memory->count - 96, 96 * sizeof memory->past[0]);
+    memory->count = 96;
+}
+
 /* Add a value to the history. */
 static void kepler_record(kepler_memory *memory, const double value[4])
 {
-    if (memory->count == 192) {
-        memmove(memory->past, memory->past + 192 - 96, 96 * sizeof memory->past[0]);
-        memory->count = 96;
-    }
+    kepler_make_room(memory, 1);
     memcpy(memory->past[memory->count++], value, 4 * sizeof value[0]);
 }
 
@@ -1395,6 +1400,15 @@ static void kepler_foresee(const kepler_memory *memory, kepler_lanes weight[rest
     }
 }
 
+/* kepler_record for the values of all lanes, one after the other. */
+static void kepler_record_lanes(kepler_memory *memory, kepler_lanes y[restrict 4])
+{
+    kepler_make_room(memory, kepler_LANES);
+    for (int lane = 0; lane < kepler_LANES; ++lane)
+        for (int i = 0; i < 4; ++i) memory->past[memory->count + lane][i] = y[i][lane];
+    memory->count += kepler_LANES;
+}
+
 /* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
    method, to leading order. */
 static void kepler_march(const kepler_solver *s, kepler_table *table, kepler_model model[1])
@@ -1435,7 +1449,7 @@ static int kepler_block(kepler_solver *s, kepler_table *table, int most)
 {
     kepler_model model[1];
     kepler_lanes sizes;
-    double x[4], carry[4], value[4], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
+    double x[4], carry[4], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
     if (!s->foreseeing) kepler_march(s, table, model);
     for (int stage = 0; stage < 1; ++stage) {
@@ -1469,10 +1483,7 @@ static int kepler_block(kepler_solver *s, kepler_table *table, int most)
     s->steps += kepler_LANES;
     for (int stage = 0; stage < 1; ++stage) {
         kepler_memory *memory = &s->memory[stage];
-        for (int lane = 0; lane < kepler_LANES; ++lane) {
-            for (int i = 0; i < 4; ++i) value[i] = model[stage].y[i][lane];
-            kepler_record(memory, value);
-        }
+        kepler_record_lanes(memory, model[stage].y);
         memory->slow = passes > 1 ? memory->slow + kepler_LANES : 0;
         if (memory->slow > memory->patience && s->foreseeing) kepler_fit(memory);
     }

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: e80c57e08d29eff7d942d58d241d472642e2756c85d4868d5185494ad911ce1d
+ * body-sha256: 840e143be188b6d0dde91e4a9a2faab7dbd334ce91d0a39d69e67f48156b444a
  */
 #include "kowalevski_top.h"
 
@@ -1146,13 +1146,18 @@ static void kowalevski_top_train(kowalevski_top_memory *memory, int component)
         }
 }
 
+/* Drop what is old, if so many values would not fit into the history. */
+static void kowalevski_top_make_room(kowalevski_top_memory *memory, int values)
+{
+    if (memory->count + values <= 192) return;
+    memmove(memory->past, memory->past + memory->count - 96, 96 * sizeof memory->past[0]);
+    memory->count = 96;
+}
+
 /* Add a value to the history. */
 static void kowalevski_top_record(kowalevski_top_memory *memory, const double value[6])
 {
-    if (memory->count == 192) {
-        memmove(memory->past, memory->past + 192 - 96, 96 * sizeof memory->past[0]);
-        memory->count = 96;
-    }
+    kowalevski_top_make_room(memory, 1);
     memcpy(memory->past[memory->count++], value, 6 * sizeof value[0]);
 }
 
@@ -2399,6 +2404,15 @@ static void kowalevski_top_foresee(const kowalevski_top_memory *memory, kowalevs
     }
 }
 
+/* kowalevski_top_record for the values of all lanes, one after the other. */
+static void kowalevski_top_record_lanes(kowalevski_top_memory *memory, kowalevski_top_lanes y[restrict 6])
+{
+    kowalevski_top_make_room(memory, kowalevski_top_LANES);
+    for (int lane = 0; lane < kowalevski_top_LANES; ++lane)
+        for (int i = 0; i < 6; ++i) memory->past[memory->count + lane][i] = y[i][lane];
+    memory->count += kowalevski_top_LANES;
+}
+
 /* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
    method, to leading order. */
 static void kowalevski_top_march(const kowalevski_top_solver *s, kowalevski_top_table *table, kowalevski_top_model model[1])
@@ -2439,7 +2453,7 @@ static int kowalevski_top_block(kowalevski_top_solver *s, kowalevski_top_table *
 {
     kowalevski_top_model model[1];
     kowalevski_top_lanes sizes;
-    double x[6], carry[6], value[6], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
+    double x[6], carry[6], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
     if (!s->foreseeing) kowalevski_top_march(s, table, model);
     for (int stage = 0; stage < 1; ++stage) {
@@ -2473,10 +2487,7 @@ static int kowalevski_top_block(kowalevski_top_solver *s, kowalevski_top_table *
     s->steps += kowalevski_top_LANES;
     for (int stage = 0; stage < 1; ++stage) {
         kowalevski_top_memory *memory = &s->memory[stage];
-        for (int lane = 0; lane < kowalevski_top_LANES; ++lane) {
-            for (int i = 0; i < 6; ++i) value[i] = model[stage].y[i][lane];
-            kowalevski_top_record(memory, value);
-        }
+        kowalevski_top_record_lanes(memory, model[stage].y);
         memory->slow = passes > 1 ? memory->slow + kowalevski_top_LANES : 0;
         if (memory->slow > memory->patience && s->foreseeing) kowalevski_top_fit(memory);
     }

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 040ef07211d61af71fe633563399fc45cce4dc9e08ed4ad881572edb929a4cae
+ * body-sha256: 35ec3efc8ea50cd7e0cead575bc2d23c89265f228e23cf418559730d7f6594e7
  */
 #include "lagrange_top.h"
 
@@ -740,13 +740,18 @@ static void lagrange_top_train(lagrange_top_memory *memory, int component)
         }
 }
 
+/* Drop what is old, if so many values would not fit into the history. */
+static void lagrange_top_make_room(lagrange_top_memory *memory, int values)
+{
+    if (memory->count + values <= 192) return;
+    memmove(memory->past, memory->past + memory->count - 96, 96 * sizeof memory->past[0]);
+    memory->count = 96;
+}
+
 /* Add a value to the history. */
 static void lagrange_top_record(lagrange_top_memory *memory, const double value[6])
 {
-    if (memory->count == 192) {
-        memmove(memory->past, memory->past + 192 - 96, 96 * sizeof memory->past[0]);
-        memory->count = 96;
-    }
+    lagrange_top_make_room(memory, 1);
     memcpy(memory->past[memory->count++], value, 6 * sizeof value[0]);
 }
 
@@ -1674,6 +1679,15 @@ static void lagrange_top_foresee(const lagrange_top_memory *memory, lagrange_top
     }
 }
 
+/* lagrange_top_record for the values of all lanes, one after the other. */
+static void lagrange_top_record_lanes(lagrange_top_memory *memory, lagrange_top_lanes y[restrict 6])
+{
+    lagrange_top_make_room(memory, lagrange_top_LANES);
+    for (int lane = 0; lane < lagrange_top_LANES; ++lane)
+        for (int i = 0; i < 6; ++i) memory->past[memory->count + lane][i] = y[i][lane];
+    memory->count += lagrange_top_LANES;
+}
+
 /* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
    method, to leading order. */
 static void lagrange_top_march(const lagrange_top_solver *s, lagrange_top_table *table, lagrange_top_model model[1])
@@ -1714,7 +1728,7 @@ static int lagrange_top_block(lagrange_top_solver *s, lagrange_top_table *table,
 {
     lagrange_top_model model[1];
     lagrange_top_lanes sizes;
-    double x[6], carry[6], value[6], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
+    double x[6], carry[6], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
     if (!s->foreseeing) lagrange_top_march(s, table, model);
     for (int stage = 0; stage < 1; ++stage) {
@@ -1748,10 +1762,7 @@ static int lagrange_top_block(lagrange_top_solver *s, lagrange_top_table *table,
     s->steps += lagrange_top_LANES;
     for (int stage = 0; stage < 1; ++stage) {
         lagrange_top_memory *memory = &s->memory[stage];
-        for (int lane = 0; lane < lagrange_top_LANES; ++lane) {
-            for (int i = 0; i < 6; ++i) value[i] = model[stage].y[i][lane];
-            lagrange_top_record(memory, value);
-        }
+        lagrange_top_record_lanes(memory, model[stage].y);
         memory->slow = passes > 1 ? memory->slow + lagrange_top_LANES : 0;
         if (memory->slow > memory->patience && s->foreseeing) lagrange_top_fit(memory);
     }

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 7987e7dd6bd73197686e815d7951b5431c105de2c03adce3879f318ebbaf488e
+ * body-sha256: e1ea417ccbd8a0733e1257a7b25719447aada894a56231b1fea853295024eecc
  */
 #include "lotka_volterra.h"
 
@@ -257,13 +257,18 @@ static void lotka_volterra_train(lotka_volterra_memory *memory, int component)
         }
 }
 
+/* Drop what is old, if so many values would not fit into the history. */
+static void lotka_volterra_make_room(lotka_volterra_memory *memory, int values)
+{
+    if (memory->count + values <= 192) return;
+    memmove(memory->past, memory->past + memory->count - 96, 96 * sizeof memory->past[0]);
+    memory->count = 96;
+}
+
 /* Add a value to the history. */
 static void lotka_volterra_record(lotka_volterra_memory *memory, const double value[3])
 {
-    if (memory->count == 192) {
-        memmove(memory->past, memory->past + 192 - 96, 96 * sizeof memory->past[0]);
-        memory->count = 96;
-    }
+    lotka_volterra_make_room(memory, 1);
     memcpy(memory->past[memory->count++], value, 3 * sizeof value[0]);
 }
 
@@ -772,6 +777,15 @@ static void lotka_volterra_foresee(const lotka_volterra_memory *memory, lotka_vo
     }
 }
 
+/* lotka_volterra_record for the values of all lanes, one after the other. */
+static void lotka_volterra_record_lanes(lotka_volterra_memory *memory, lotka_volterra_lanes y[restrict 3])
+{
+    lotka_volterra_make_room(memory, lotka_volterra_LANES);
+    for (int lane = 0; lane < lotka_volterra_LANES; ++lane)
+        for (int i = 0; i < 3; ++i) memory->past[memory->count + lane][i] = y[i][lane];
+    memory->count += lotka_volterra_LANES;
+}
+
 /* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
    method, to leading order. */
 static void lotka_volterra_march(const lotka_volterra_solver *s, lotka_volterra_table *table, lotka_volterra_model model[1])
@@ -812,7 +826,7 @@ static int lotka_volterra_block(lotka_volterra_solver *s, lotka_volterra_table *
 {
     lotka_volterra_model model[1];
     lotka_volterra_lanes sizes;
-    double x[3], carry[3], value[3], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
+    double x[3], carry[3], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
     if (!s->foreseeing) lotka_volterra_march(s, table, model);
     for (int stage = 0; stage < 1; ++stage) {
@@ -846,10 +860,7 @@ static int lotka_volterra_block(lotka_volterra_solver *s, lotka_volterra_table *
     s->steps += lotka_volterra_LANES;
     for (int stage = 0; stage < 1; ++stage) {
         lotka_volterra_memory *memory = &s->memory[stage];
-        for (int lane = 0; lane < lotka_volterra_LANES; ++lane) {
-            for (int i = 0; i < 3; ++i) value[i] = model[stage].y[i][lane];
-            lotka_volterra_record(memory, value);
-        }
+        lotka_volterra_record_lanes(memory, model[stage].y);
         memory->slow = passes > 1 ? memory->slow + lotka_volterra_LANES : 0;
         if (memory->slow > memory->patience && s->foreseeing) lotka_volterra_fit(memory);
     }

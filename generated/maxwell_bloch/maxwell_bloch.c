@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: fe9705e323f1edaa15ca4ebdaa6acc39101fc8877ff3713e92bbe40208103e5b
+ * body-sha256: 8ba2881756531f7d4523e30273396e70feddfc66a25ca788863c7e1e410544a4
  */
 #include "maxwell_bloch.h"
 
@@ -246,13 +246,18 @@ static void maxwell_bloch_train(maxwell_bloch_memory *memory, int component)
         }
 }
 
+/* Drop what is old, if so many values would not fit into the history. */
+static void maxwell_bloch_make_room(maxwell_bloch_memory *memory, int values)
+{
+    if (memory->count + values <= 192) return;
+    memmove(memory->past, memory->past + memory->count - 96, 96 * sizeof memory->past[0]);
+    memory->count = 96;
+}
+
 /* Add a value to the history. */
 static void maxwell_bloch_record(maxwell_bloch_memory *memory, const double value[3])
 {
-    if (memory->count == 192) {
-        memmove(memory->past, memory->past + 192 - 96, 96 * sizeof memory->past[0]);
-        memory->count = 96;
-    }
+    maxwell_bloch_make_room(memory, 1);
     memcpy(memory->past[memory->count++], value, 3 * sizeof value[0]);
 }
 
@@ -722,6 +727,15 @@ static void maxwell_bloch_foresee(const maxwell_bloch_memory *memory, maxwell_bl
     }
 }
 
+/* maxwell_bloch_record for the values of all lanes, one after the other. */
+static void maxwell_bloch_record_lanes(maxwell_bloch_memory *memory, maxwell_bloch_lanes y[restrict 3])
+{
+    maxwell_bloch_make_room(memory, maxwell_bloch_LANES);
+    for (int lane = 0; lane < maxwell_bloch_LANES; ++lane)
+        for (int i = 0; i < 3; ++i) memory->past[memory->count + lane][i] = y[i][lane];
+    memory->count += maxwell_bloch_LANES;
+}
+
 /* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
    method, to leading order. */
 static void maxwell_bloch_march(const maxwell_bloch_solver *s, maxwell_bloch_table *table, maxwell_bloch_model model[1])
@@ -762,7 +776,7 @@ static int maxwell_bloch_block(maxwell_bloch_solver *s, maxwell_bloch_table *tab
 {
     maxwell_bloch_model model[1];
     maxwell_bloch_lanes sizes;
-    double x[3], carry[3], value[3], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
+    double x[3], carry[3], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
     if (!s->foreseeing) maxwell_bloch_march(s, table, model);
     for (int stage = 0; stage < 1; ++stage) {
@@ -796,10 +810,7 @@ static int maxwell_bloch_block(maxwell_bloch_solver *s, maxwell_bloch_table *tab
     s->steps += maxwell_bloch_LANES;
     for (int stage = 0; stage < 1; ++stage) {
         maxwell_bloch_memory *memory = &s->memory[stage];
-        for (int lane = 0; lane < maxwell_bloch_LANES; ++lane) {
-            for (int i = 0; i < 3; ++i) value[i] = model[stage].y[i][lane];
-            maxwell_bloch_record(memory, value);
-        }
+        maxwell_bloch_record_lanes(memory, model[stage].y);
         memory->slow = passes > 1 ? memory->slow + maxwell_bloch_LANES : 0;
         if (memory->slow > memory->patience && s->foreseeing) maxwell_bloch_fit(memory);
     }

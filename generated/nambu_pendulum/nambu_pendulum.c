@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: b9313ceac72420ede8cf8af465ecb66afe7db316a7fd95b8099cf3c7864ecfa6
+ * body-sha256: 502b0ee2207b10694346c3eb601167adcfa695a0bb1c2c40da069c1b8f18c572
  */
 #include "nambu_pendulum.h"
 
@@ -218,13 +218,18 @@ static void nambu_pendulum_train(nambu_pendulum_memory *memory, int component)
         }
 }
 
+/* Drop what is old, if so many values would not fit into the history. */
+static void nambu_pendulum_make_room(nambu_pendulum_memory *memory, int values)
+{
+    if (memory->count + values <= 192) return;
+    memmove(memory->past, memory->past + memory->count - 96, 96 * sizeof memory->past[0]);
+    memory->count = 96;
+}
+
 /* Add a value to the history. */
 static void nambu_pendulum_record(nambu_pendulum_memory *memory, const double value[3])
 {
-    if (memory->count == 192) {
-        memmove(memory->past, memory->past + 192 - 96, 96 * sizeof memory->past[0]);
-        memory->count = 96;
-    }
+    nambu_pendulum_make_room(memory, 1);
     memcpy(memory->past[memory->count++], value, 3 * sizeof value[0]);
 }
 

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 94d03f7006ebfdc1c45ce91cac790f7485155c76f7c1effb071d774765d60b80
+ * body-sha256: df86d74699a9bfc2bbbe874e4b990dc4742f7c82ff5a3a0493151d17d51add44
  */
 #include "pendulum.h"
 
@@ -251,13 +251,18 @@ static void pendulum_train(pendulum_memory *memory, int component)
         }
 }
 
+/* Drop what is old, if so many values would not fit into the history. */
+static void pendulum_make_room(pendulum_memory *memory, int values)
+{
+    if (memory->count + values <= 192) return;
+    memmove(memory->past, memory->past + memory->count - 96, 96 * sizeof memory->past[0]);
+    memory->count = 96;
+}
+
 /* Add a value to the history. */
 static void pendulum_record(pendulum_memory *memory, const double value[2])
 {
-    if (memory->count == 192) {
-        memmove(memory->past, memory->past + 192 - 96, 96 * sizeof memory->past[0]);
-        memory->count = 96;
-    }
+    pendulum_make_room(memory, 1);
     memcpy(memory->past[memory->count++], value, 2 * sizeof value[0]);
 }
 
@@ -735,6 +740,15 @@ static void pendulum_foresee(const pendulum_memory *memory, pendulum_lanes weigh
     }
 }
 
+/* pendulum_record for the values of all lanes, one after the other. */
+static void pendulum_record_lanes(pendulum_memory *memory, pendulum_lanes y[restrict 2])
+{
+    pendulum_make_room(memory, pendulum_LANES);
+    for (int lane = 0; lane < pendulum_LANES; ++lane)
+        for (int i = 0; i < 2; ++i) memory->past[memory->count + lane][i] = y[i][lane];
+    memory->count += pendulum_LANES;
+}
+
 /* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
    method, to leading order. */
 static void pendulum_march(const pendulum_solver *s, pendulum_table *table, pendulum_model model[1])
@@ -775,7 +789,7 @@ static int pendulum_block(pendulum_solver *s, pendulum_table *table, int most)
 {
     pendulum_model model[1];
     pendulum_lanes sizes;
-    double x[2], carry[2], value[2], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
+    double x[2], carry[2], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
     if (!s->foreseeing) pendulum_march(s, table, model);
     for (int stage = 0; stage < 1; ++stage) {
@@ -809,10 +823,7 @@ static int pendulum_block(pendulum_solver *s, pendulum_table *table, int most)
     s->steps += pendulum_LANES;
     for (int stage = 0; stage < 1; ++stage) {
         pendulum_memory *memory = &s->memory[stage];
-        for (int lane = 0; lane < pendulum_LANES; ++lane) {
-            for (int i = 0; i < 2; ++i) value[i] = model[stage].y[i][lane];
-            pendulum_record(memory, value);
-        }
+        pendulum_record_lanes(memory, model[stage].y);
         memory->slow = passes > 1 ? memory->slow + pendulum_LANES : 0;
         if (memory->slow > memory->patience && s->foreseeing) pendulum_fit(memory);
     }

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 25f9f02016aa1e211bd7523ddc6b83a61ff07d03591b22aba24b1d5a8498f787
+ * body-sha256: 0bf10ce96af080847e76eac53451e19e51c5c635ede091fcb61e4d60acfb258e
  */
 #include "poisson_not_hamiltonian.h"
 
@@ -354,13 +354,18 @@ static void poisson_not_hamiltonian_train(poisson_not_hamiltonian_memory *memory
         }
 }
 
+/* Drop what is old, if so many values would not fit into the history. */
+static void poisson_not_hamiltonian_make_room(poisson_not_hamiltonian_memory *memory, int values)
+{
+    if (memory->count + values <= 192) return;
+    memmove(memory->past, memory->past + memory->count - 96, 96 * sizeof memory->past[0]);
+    memory->count = 96;
+}
+
 /* Add a value to the history. */
 static void poisson_not_hamiltonian_record(poisson_not_hamiltonian_memory *memory, const double value[3])
 {
-    if (memory->count == 192) {
-        memmove(memory->past, memory->past + 192 - 96, 96 * sizeof memory->past[0]);
-        memory->count = 96;
-    }
+    poisson_not_hamiltonian_make_room(memory, 1);
     memcpy(memory->past[memory->count++], value, 3 * sizeof value[0]);
 }
 
@@ -1036,6 +1041,15 @@ static void poisson_not_hamiltonian_foresee(const poisson_not_hamiltonian_memory
     }
 }
 
+/* poisson_not_hamiltonian_record for the values of all lanes, one after the other. */
+static void poisson_not_hamiltonian_record_lanes(poisson_not_hamiltonian_memory *memory, poisson_not_hamiltonian_lanes y[restrict 3])
+{
+    poisson_not_hamiltonian_make_room(memory, poisson_not_hamiltonian_LANES);
+    for (int lane = 0; lane < poisson_not_hamiltonian_LANES; ++lane)
+        for (int i = 0; i < 3; ++i) memory->past[memory->count + lane][i] = y[i][lane];
+    memory->count += poisson_not_hamiltonian_LANES;
+}
+
 /* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
    method, to leading order. */
 static void poisson_not_hamiltonian_march(const poisson_not_hamiltonian_solver *s, poisson_not_hamiltonian_table *table, poisson_not_hamiltonian_model model[1])
@@ -1076,7 +1090,7 @@ static int poisson_not_hamiltonian_block(poisson_not_hamiltonian_solver *s, pois
 {
     poisson_not_hamiltonian_model model[1];
     poisson_not_hamiltonian_lanes sizes;
-    double x[3], carry[3], value[3], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
+    double x[3], carry[3], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
     if (!s->foreseeing) poisson_not_hamiltonian_march(s, table, model);
     for (int stage = 0; stage < 1; ++stage) {
@@ -1110,10 +1124,7 @@ static int poisson_not_hamiltonian_block(poisson_not_hamiltonian_solver *s, pois
     s->steps += poisson_not_hamiltonian_LANES;
     for (int stage = 0; stage < 1; ++stage) {
         poisson_not_hamiltonian_memory *memory = &s->memory[stage];
-        for (int lane = 0; lane < poisson_not_hamiltonian_LANES; ++lane) {
-            for (int i = 0; i < 3; ++i) value[i] = model[stage].y[i][lane];
-            poisson_not_hamiltonian_record(memory, value);
-        }
+        poisson_not_hamiltonian_record_lanes(memory, model[stage].y);
         memory->slow = passes > 1 ? memory->slow + poisson_not_hamiltonian_LANES : 0;
         if (memory->slow > memory->patience && s->foreseeing) poisson_not_hamiltonian_fit(memory);
     }

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: a81d1a3a72652338f9a9ce2446ace7777e05ee6fd96328b91220c144fb16f2b3
+ * body-sha256: f63a0964cf2665dc6965ef9b0fa45123fccef44bcc60229b25af2b79e582d708
  */
 #include "predator_prey.h"
 
@@ -252,13 +252,18 @@ static void predator_prey_train(predator_prey_memory *memory, int component)
         }
 }
 
+/* Drop what is old, if so many values would not fit into the history. */
+static void predator_prey_make_room(predator_prey_memory *memory, int values)
+{
+    if (memory->count + values <= 192) return;
+    memmove(memory->past, memory->past + memory->count - 96, 96 * sizeof memory->past[0]);
+    memory->count = 96;
+}
+
 /* Add a value to the history. */
 static void predator_prey_record(predator_prey_memory *memory, const double value[2])
 {
-    if (memory->count == 192) {
-        memmove(memory->past, memory->past + 192 - 96, 96 * sizeof memory->past[0]);
-        memory->count = 96;
-    }
+    predator_prey_make_room(memory, 1);
     memcpy(memory->past[memory->count++], value, 2 * sizeof value[0]);
 }
 
@@ -728,6 +733,15 @@ static void predator_prey_foresee(const predator_prey_memory *memory, predator_p
     }
 }
 
+/* predator_prey_record for the values of all lanes, one after the other. */
+static void predator_prey_record_lanes(predator_prey_memory *memory, predator_prey_lanes y[restrict 2])
+{
+    predator_prey_make_room(memory, predator_prey_LANES);
+    for (int lane = 0; lane < predator_prey_LANES; ++lane)
+        for (int i = 0; i < 2; ++i) memory->past[memory->count + lane][i] = y[i][lane];
+    memory->count += predator_prey_LANES;
+}
+
 /* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
    method, to leading order. */
 static void predator_prey_march(const predator_prey_solver *s, predator_prey_table *table, predator_prey_model model[1])
@@ -768,7 +782,7 @@ static int predator_prey_block(predator_prey_solver *s, predator_prey_table *tab
 {
     predator_prey_model model[1];
     predator_prey_lanes sizes;
-    double x[2], carry[2], value[2], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
+    double x[2], carry[2], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
     if (!s->foreseeing) predator_prey_march(s, table, model);
     for (int stage = 0; stage < 1; ++stage) {
@@ -802,10 +816,7 @@ static int predator_prey_block(predator_prey_solver *s, predator_prey_table *tab
     s->steps += predator_prey_LANES;
     for (int stage = 0; stage < 1; ++stage) {
         predator_prey_memory *memory = &s->memory[stage];
-        for (int lane = 0; lane < predator_prey_LANES; ++lane) {
-            for (int i = 0; i < 2; ++i) value[i] = model[stage].y[i][lane];
-            predator_prey_record(memory, value);
-        }
+        predator_prey_record_lanes(memory, model[stage].y);
         memory->slow = passes > 1 ? memory->slow + predator_prey_LANES : 0;
         if (memory->slow > memory->patience && s->foreseeing) predator_prey_fit(memory);
     }

@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 3310781d247f5265407b1e1dc6bc5521efc5448bec4be8849ee50b6761a4102a
+ * body-sha256: 0093157c5bf88e63df168669f3c4d589e30e6b4f876cbab4cf6f046f88ea8b3a
  */
 #include "rigid_body.h"
 
@@ -519,13 +519,18 @@ static void rigid_body_train(rigid_body_memory *memory, int component)
         }
 }
 
+/* Drop what is old, if so many values would not fit into the history. */
+static void rigid_body_make_room(rigid_body_memory *memory, int values)
+{
+    if (memory->count + values <= 192) return;
+    memmove(memory->past, memory->past + memory->count - 96, 96 * sizeof memory->past[0]);
+    memory->count = 96;
+}
+
 /* Add a value to the history. */
 static void rigid_body_record(rigid_body_memory *memory, const double value[3])
 {
-    if (memory->count == 192) {
-        memmove(memory->past, memory->past + 192 - 96, 96 * sizeof memory->past[0]);
-        memory->count = 96;
-    }
+    rigid_body_make_room(memory, 1);
     memcpy(memory->past[memory->count++], value, 3 * sizeof value[0]);
 }
 
@@ -1230,6 +1235,15 @@ static void rigid_body_foresee(const rigid_body_memory *memory, rigid_body_lanes
     }
 }
 
+/* rigid_body_record for the values of all lanes, one after the other. */
+static void rigid_body_record_lanes(rigid_body_memory *memory, rigid_body_lanes y[restrict 3])
+{
+    rigid_body_make_room(memory, rigid_body_LANES);
+    for (int lane = 0; lane < rigid_body_LANES; ++lane)
+        for (int i = 0; i < 3; ++i) memory->past[memory->count + lane][i] = y[i][lane];
+    memory->count += rigid_body_LANES;
+}
+
 /* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
    method, to leading order. */
 static void rigid_body_march(const rigid_body_solver *s, rigid_body_table *table, rigid_body_model model[1])
@@ -1270,7 +1284,7 @@ static int rigid_body_block(rigid_body_solver *s, rigid_body_table *table, int m
 {
     rigid_body_model model[1];
     rigid_body_lanes sizes;
-    double x[3], carry[3], value[3], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
+    double x[3], carry[3], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
     if (!s->foreseeing) rigid_body_march(s, table, model);
     for (int stage = 0; stage < 1; ++stage) {
@@ -1304,10 +1318,7 @@ static int rigid_body_block(rigid_body_solver *s, rigid_body_table *table, int m
     s->steps += rigid_body_LANES;
     for (int stage = 0; stage < 1; ++stage) {
         rigid_body_memory *memory = &s->memory[stage];
-        for (int lane = 0; lane < rigid_body_LANES; ++lane) {
-            for (int i = 0; i < 3; ++i) value[i] = model[stage].y[i][lane];
-            rigid_body_record(memory, value);
-        }
+        rigid_body_record_lanes(memory, model[stage].y);
         memory->slow = passes > 1 ? memory->slow + rigid_body_LANES : 0;
         if (memory->slow > memory->patience && s->foreseeing) rigid_body_fit(memory);
     }

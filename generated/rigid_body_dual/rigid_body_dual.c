@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: f64fd48667453cd4f7664b28f393ff521610adc5a5d7e56e3285ae1a8bcdc7e0
+ * body-sha256: 7be1a05e07689d8e34cc8b14ab1178c359395d8ec73be962bf556a197698d6a6
  */
 #include "rigid_body_dual.h"
 
@@ -405,13 +405,18 @@ static void rigid_body_dual_train(rigid_body_dual_memory *memory, int component)
         }
 }
 
+/* Drop what is old, if so many values would not fit into the history. */
+static void rigid_body_dual_make_room(rigid_body_dual_memory *memory, int values)
+{
+    if (memory->count + values <= 192) return;
+    memmove(memory->past, memory->past + memory->count - 96, 96 * sizeof memory->past[0]);
+    memory->count = 96;
+}
+
 /* Add a value to the history. */
 static void rigid_body_dual_record(rigid_body_dual_memory *memory, const double value[3])
 {
-    if (memory->count == 192) {
-        memmove(memory->past, memory->past + 192 - 96, 96 * sizeof memory->past[0]);
-        memory->count = 96;
-    }
+    rigid_body_dual_make_room(memory, 1);
     memcpy(memory->past[memory->count++], value, 3 * sizeof value[0]);
 }
 
@@ -1130,6 +1135,15 @@ static void rigid_body_dual_foresee(const rigid_body_dual_memory *memory, rigid_
     }
 }
 
+/* rigid_body_dual_record for the values of all lanes, one after the other. */
+static void rigid_body_dual_record_lanes(rigid_body_dual_memory *memory, rigid_body_dual_lanes y[restrict 3])
+{
+    rigid_body_dual_make_room(memory, rigid_body_dual_LANES);
+    for (int lane = 0; lane < rigid_body_dual_LANES; ++lane)
+        for (int i = 0; i < 3; ++i) memory->past[memory->count + lane][i] = y[i][lane];
+    memory->count += rigid_body_dual_LANES;
+}
+
 /* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
    method, to leading order. */
 static void rigid_body_dual_march(const rigid_body_dual_solver *s, rigid_body_dual_table *table, rigid_body_dual_model model[1])
@@ -1170,7 +1184,7 @@ static int rigid_body_dual_block(rigid_body_dual_solver *s, rigid_body_dual_tabl
 {
     rigid_body_dual_model model[1];
     rigid_body_dual_lanes sizes;
-    double x[3], carry[3], value[3], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
+    double x[3], carry[3], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
     if (!s->foreseeing) rigid_body_dual_march(s, table, model);
     for (int stage = 0; stage < 1; ++stage) {
@@ -1204,10 +1218,7 @@ static int rigid_body_dual_block(rigid_body_dual_solver *s, rigid_body_dual_tabl
     s->steps += rigid_body_dual_LANES;
     for (int stage = 0; stage < 1; ++stage) {
         rigid_body_dual_memory *memory = &s->memory[stage];
-        for (int lane = 0; lane < rigid_body_dual_LANES; ++lane) {
-            for (int i = 0; i < 3; ++i) value[i] = model[stage].y[i][lane];
-            rigid_body_dual_record(memory, value);
-        }
+        rigid_body_dual_record_lanes(memory, model[stage].y);
         memory->slow = passes > 1 ? memory->slow + rigid_body_dual_LANES : 0;
         if (memory->slow > memory->patience && s->foreseeing) rigid_body_dual_fit(memory);
     }

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 73bcd5bdc437e72cc28f3d2b21e90cb3846db144c3924edf2801c02850adb654
+ * body-sha256: f7aebc71563af6d69458471aeffbb2ba5414df37e72c4d3067a728c366c2c8e8
  */
 #include "rigid_body_paper.h"
 
@@ -361,13 +361,18 @@ static void rigid_body_paper_train(rigid_body_paper_memory *memory, int componen
         }
 }
 
+/* Drop what is old, if so many values would not fit into the history. */
+static void rigid_body_paper_make_room(rigid_body_paper_memory *memory, int values)
+{
+    if (memory->count + values <= 192) return;
+    memmove(memory->past, memory->past + memory->count - 96, 96 * sizeof memory->past[0]);
+    memory->count = 96;
+}
+
 /* Add a value to the history. */
 static void rigid_body_paper_record(rigid_body_paper_memory *memory, const double value[3])
 {
-    if (memory->count == 192) {
-        memmove(memory->past, memory->past + 192 - 96, 96 * sizeof memory->past[0]);
-        memory->count = 96;
-    }
+    rigid_body_paper_make_room(memory, 1);
     memcpy(memory->past[memory->count++], value, 3 * sizeof value[0]);
 }
 
@@ -907,6 +912,15 @@ static void rigid_body_paper_foresee(const rigid_body_paper_memory *memory, rigi
     }
 }
 
+/* rigid_body_paper_record for the values of all lanes, one after the other. */
+static void rigid_body_paper_record_lanes(rigid_body_paper_memory *memory, rigid_body_paper_lanes y[restrict 3])
+{
+    rigid_body_paper_make_room(memory, rigid_body_paper_LANES);
+    for (int lane = 0; lane < rigid_body_paper_LANES; ++lane)
+        for (int i = 0; i < 3; ++i) memory->past[memory->count + lane][i] = y[i][lane];
+    memory->count += rigid_body_paper_LANES;
+}
+
 /* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
    method, to leading order. */
 static void rigid_body_paper_march(const rigid_body_paper_solver *s, rigid_body_paper_table *table, rigid_body_paper_model model[1])
@@ -947,7 +961,7 @@ static int rigid_body_paper_block(rigid_body_paper_solver *s, rigid_body_paper_t
 {
     rigid_body_paper_model model[1];
     rigid_body_paper_lanes sizes;
-    double x[3], carry[3], value[3], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
+    double x[3], carry[3], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
     if (!s->foreseeing) rigid_body_paper_march(s, table, model);
     for (int stage = 0; stage < 1; ++stage) {
@@ -981,10 +995,7 @@ static int rigid_body_paper_block(rigid_body_paper_solver *s, rigid_body_paper_t
     s->steps += rigid_body_paper_LANES;
     for (int stage = 0; stage < 1; ++stage) {
         rigid_body_paper_memory *memory = &s->memory[stage];
-        for (int lane = 0; lane < rigid_body_paper_LANES; ++lane) {
-            for (int i = 0; i < 3; ++i) value[i] = model[stage].y[i][lane];
-            rigid_body_paper_record(memory, value);
-        }
+        rigid_body_paper_record_lanes(memory, model[stage].y);
         memory->slow = passes > 1 ? memory->slow + rigid_body_paper_LANES : 0;
         if (memory->slow > memory->patience && s->foreseeing) rigid_body_paper_fit(memory);
     }

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 679f3e8b2b0099963ebacf9d0414b26a004f778adef94b1fd3eb966452f1339a
+ * body-sha256: 7adc39f555b1f571824eb6b33dcb1104dbc8aea0e5fc5d3499b9e255098bf8cf
  */
 #include "sir_epidemic.h"
 
@@ -221,13 +221,18 @@ static void sir_epidemic_train(sir_epidemic_memory *memory, int component)
         }
 }
 
+/* Drop what is old, if so many values would not fit into the history. */
+static void sir_epidemic_make_room(sir_epidemic_memory *memory, int values)
+{
+    if (memory->count + values <= 192) return;
+    memmove(memory->past, memory->past + memory->count - 96, 96 * sizeof memory->past[0]);
+    memory->count = 96;
+}
+
 /* Add a value to the history. */
 static void sir_epidemic_record(sir_epidemic_memory *memory, const double value[3])
 {
-    if (memory->count == 192) {
-        memmove(memory->past, memory->past + 192 - 96, 96 * sizeof memory->past[0]);
-        memory->count = 96;
-    }
+    sir_epidemic_make_room(memory, 1);
     memcpy(memory->past[memory->count++], value, 3 * sizeof value[0]);
 }
 

@@ -12,7 +12,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 1ed9611753e4b1f0638363deda02254b7a7179336c1df5de56cae43b09d0b2dd
+ * body-sha256: 34fbcfdcdda0a02b5401942399025a4f2cdabb71c97dcda6e579bfbc14ab9e53
  */
 #include "sir_final_size.h"
 
@@ -213,13 +213,18 @@ static void sir_final_size_train(sir_final_size_memory *memory, int component)
         }
 }
 
+/* Drop what is old, if so many values would not fit into the history. */
+static void sir_final_size_make_room(sir_final_size_memory *memory, int values)
+{
+    if (memory->count + values <= 192) return;
+    memmove(memory->past, memory->past + memory->count - 96, 96 * sizeof memory->past[0]);
+    memory->count = 96;
+}
+
 /* Add a value to the history. */
 static void sir_final_size_record(sir_final_size_memory *memory, const double value[3])
 {
-    if (memory->count == 192) {
-        memmove(memory->past, memory->past + 192 - 96, 96 * sizeof memory->past[0]);
-        memory->count = 96;
-    }
+    sir_final_size_make_room(memory, 1);
     memcpy(memory->past[memory->count++], value, 3 * sizeof value[0]);
 }
 

@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 01d9498f30683d3645673da57f7a9381c0c844ad265912c6fa53bde2d8bc1155
+ * body-sha256: 918cf4bf387e5fd1f9675b17235fdae8452fb3712a179b61b46f327a1815a9ec
  */
 #include "sklyanin_gyrostat.h"
 
@@ -317,13 +317,18 @@ static void sklyanin_gyrostat_train(sklyanin_gyrostat_memory *memory, int compon
         }
 }
 
+/* Drop what is old, if so many values would not fit into the history. */
+static void sklyanin_gyrostat_make_room(sklyanin_gyrostat_memory *memory, int values)
+{
+    if (memory->count + values <= 192) return;
+    memmove(memory->past, memory->past + memory->count - 96, 96 * sizeof memory->past[0]);
+    memory->count = 96;
+}
+
 /* Add a value to the history. */
 static void sklyanin_gyrostat_record(sklyanin_gyrostat_memory *memory, const double value[4])
 {
-    if (memory->count == 192) {
-        memmove(memory->past, memory->past + 192 - 96, 96 * sizeof memory->past[0]);
-        memory->count = 96;
-    }
+    sklyanin_gyrostat_make_room(memory, 1);
     memcpy(memory->past[memory->count++], value, 4 * sizeof value[0]);
 }
 

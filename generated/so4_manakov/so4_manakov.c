@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 5bb3aacdacc43f3c2ecbb7d515b1d1645646c18e0ed201ef862de424f38c95d4
+ * body-sha256: c40a0a9193de41c58048029d4daccd4bd5fab531629b499d90b8b20d50ae09e2
  */
 #include "so4_manakov.h"
 
@@ -826,13 +826,18 @@ static void so4_manakov_train(so4_manakov_memory *memory, int component)
         }
 }
 
+/* Drop what is old, if so many values would not fit into the history. */
+static void so4_manakov_make_room(so4_manakov_memory *memory, int values)
+{
+    if (memory->count + values <= 192) return;
+    memmove(memory->past, memory->past + memory->count - 96, 96 * sizeof memory->past[0]);
+    memory->count = 96;
+}
+
 /* Add a value to the history. */
 static void so4_manakov_record(so4_manakov_memory *memory, const double value[6])
 {
-    if (memory->count == 192) {
-        memmove(memory->past, memory->past + 192 - 96, 96 * sizeof memory->past[0]);
-        memory->count = 96;
-    }
+    so4_manakov_make_room(memory, 1);
     memcpy(memory->past[memory->count++], value, 6 * sizeof value[0]);
 }
 
@@ -2035,6 +2040,15 @@ static void so4_manakov_foresee(const so4_manakov_memory *memory, so4_manakov_la
     }
 }
 
+/* so4_manakov_record for the values of all lanes, one after the other. */
+static void so4_manakov_record_lanes(so4_manakov_memory *memory, so4_manakov_lanes y[restrict 6])
+{
+    so4_manakov_make_room(memory, so4_manakov_LANES);
+    for (int lane = 0; lane < so4_manakov_LANES; ++lane)
+        for (int i = 0; i < 6; ++i) memory->past[memory->count + lane][i] = y[i][lane];
+    memory->count += so4_manakov_LANES;
+}
+
 /* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
    method, to leading order. */
 static void so4_manakov_march(const so4_manakov_solver *s, so4_manakov_table *table, so4_manakov_model model[1])
@@ -2075,7 +2089,7 @@ static int so4_manakov_block(so4_manakov_solver *s, so4_manakov_table *table, in
 {
     so4_manakov_model model[1];
     so4_manakov_lanes sizes;
-    double x[6], carry[6], value[6], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
+    double x[6], carry[6], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
     if (!s->foreseeing) so4_manakov_march(s, table, model);
     for (int stage = 0; stage < 1; ++stage) {
@@ -2109,10 +2123,7 @@ static int so4_manakov_block(so4_manakov_solver *s, so4_manakov_table *table, in
     s->steps += so4_manakov_LANES;
     for (int stage = 0; stage < 1; ++stage) {
         so4_manakov_memory *memory = &s->memory[stage];
-        for (int lane = 0; lane < so4_manakov_LANES; ++lane) {
-            for (int i = 0; i < 6; ++i) value[i] = model[stage].y[i][lane];
-            so4_manakov_record(memory, value);
-        }
+        so4_manakov_record_lanes(memory, model[stage].y);
         memory->slow = passes > 1 ? memory->slow + so4_manakov_LANES : 0;
         if (memory->slow > memory->patience && s->foreseeing) so4_manakov_fit(memory);
     }

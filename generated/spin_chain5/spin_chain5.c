@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: ba9b18ce7587dd0a2e98e7a75ee9eb3525f7048c047d3d3fe6cb443a0b287675
+ * body-sha256: 9af16312f87ad825c3b355ff1c58f0878ca3e4ecc24bfac8b3b431c26c1cb834
  */
 #include "spin_chain5.h"
 
@@ -1804,13 +1804,18 @@ static void spin_chain5_train(spin_chain5_memory *memory, int component)
         }
 }
 
+/* Drop what is old, if so many values would not fit into the history. */
+static void spin_chain5_make_room(spin_chain5_memory *memory, int values)
+{
+    if (memory->count + values <= 192) return;
+    memmove(memory->past, memory->past + memory->count - 96, 96 * sizeof memory->past[0]);
+    memory->count = 96;
+}
+
 /* Add a value to the history. */
 static void spin_chain5_record(spin_chain5_memory *memory, const double value[15])
 {
-    if (memory->count == 192) {
-        memmove(memory->past, memory->past + 192 - 96, 96 * sizeof memory->past[0]);
-        memory->count = 96;
-    }
+    spin_chain5_make_room(memory, 1);
     memcpy(memory->past[memory->count++], value, 15 * sizeof value[0]);
 }
 
@@ -4655,6 +4660,15 @@ static void spin_chain5_foresee(const spin_chain5_memory *memory, spin_chain5_la
     }
 }
 
+/* spin_chain5_record for the values of all lanes, one after the other. */
+static void spin_chain5_record_lanes(spin_chain5_memory *memory, spin_chain5_lanes y[restrict 15])
+{
+    spin_chain5_make_room(memory, spin_chain5_LANES);
+    for (int lane = 0; lane < spin_chain5_LANES; ++lane)
+        for (int i = 0; i < 15; ++i) memory->past[memory->count + lane][i] = y[i][lane];
+    memory->count += spin_chain5_LANES;
+}
+
 /* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
    method, to leading order. */
 static void spin_chain5_march(const spin_chain5_solver *s, spin_chain5_table *table, spin_chain5_model model[1])
@@ -4695,7 +4709,7 @@ static int spin_chain5_block(spin_chain5_solver *s, spin_chain5_table *table, in
 {
     spin_chain5_model model[1];
     spin_chain5_lanes sizes;
-    double x[15], carry[15], value[15], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
+    double x[15], carry[15], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
     if (!s->foreseeing) spin_chain5_march(s, table, model);
     for (int stage = 0; stage < 1; ++stage) {
@@ -4729,10 +4743,7 @@ static int spin_chain5_block(spin_chain5_solver *s, spin_chain5_table *table, in
     s->steps += spin_chain5_LANES;
     for (int stage = 0; stage < 1; ++stage) {
         spin_chain5_memory *memory = &s->memory[stage];
-        for (int lane = 0; lane < spin_chain5_LANES; ++lane) {
-            for (int i = 0; i < 15; ++i) value[i] = model[stage].y[i][lane];
-            spin_chain5_record(memory, value);
-        }
+        spin_chain5_record_lanes(memory, model[stage].y);
         memory->slow = passes > 1 ? memory->slow + spin_chain5_LANES : 0;
         if (memory->slow > memory->patience && s->foreseeing) spin_chain5_fit(memory);
     }

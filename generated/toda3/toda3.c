@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 8fd185bb8c62a4d6c264653110a181c4b2c075a6fc42808afe0ccdab8ec3e7d6
+ * body-sha256: 81a28d0f728212c6d39f5e1c34d8421240d4f5710f0c8f6ebbd708a94364c449
  */
 #include "toda3.h"
 
@@ -436,13 +436,18 @@ static void toda3_train(toda3_memory *memory, int component)
         }
 }
 
+/* Drop what is old, if so many values would not fit into the history. */
+static void toda3_make_room(toda3_memory *memory, int values)
+{
+    if (memory->count + values <= 192) return;
+    memmove(memory->past, memory->past + memory->count - 96, 96 * sizeof memory->past[0]);
+    memory->count = 96;
+}
+
 /* Add a value to the history. */
 static void toda3_record(toda3_memory *memory, const double value[5])
 {
-    if (memory->count == 192) {
-        memmove(memory->past, memory->past + 192 - 96, 96 * sizeof memory->past[0]);
-        memory->count = 96;
-    }
+    toda3_make_room(memory, 1);
     memcpy(memory->past[memory->count++], value, 5 * sizeof value[0]);
 }
 
@@ -1086,6 +1091,15 @@ static void toda3_foresee(const toda3_memory *memory, toda3_lanes weight[restric
     }
 }
 
+/* toda3_record for the values of all lanes, one after the other. */
+static void toda3_record_lanes(toda3_memory *memory, toda3_lanes y[restrict 5])
+{
+    toda3_make_room(memory, toda3_LANES);
+    for (int lane = 0; lane < toda3_LANES; ++lane)
+        for (int i = 0; i < 5; ++i) memory->past[memory->count + lane][i] = y[i][lane];
+    memory->count += toda3_LANES;
+}
+
 /* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
    method, to leading order. */
 static void toda3_march(const toda3_solver *s, toda3_table *table, toda3_model model[1])
@@ -1126,7 +1140,7 @@ static int toda3_block(toda3_solver *s, toda3_table *table, int most)
 {
     toda3_model model[1];
     toda3_lanes sizes;
-    double x[5], carry[5], value[5], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
+    double x[5], carry[5], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
     if (!s->foreseeing) toda3_march(s, table, model);
     for (int stage = 0; stage < 1; ++stage) {
@@ -1160,10 +1174,7 @@ static int toda3_block(toda3_solver *s, toda3_table *table, int most)
     s->steps += toda3_LANES;
     for (int stage = 0; stage < 1; ++stage) {
         toda3_memory *memory = &s->memory[stage];
-        for (int lane = 0; lane < toda3_LANES; ++lane) {
-            for (int i = 0; i < 5; ++i) value[i] = model[stage].y[i][lane];
-            toda3_record(memory, value);
-        }
+        toda3_record_lanes(memory, model[stage].y);
         memory->slow = passes > 1 ? memory->slow + toda3_LANES : 0;
         if (memory->slow > memory->patience && s->foreseeing) toda3_fit(memory);
     }

@@ -12,7 +12,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: c47d05f8883c086f73d4a3f827b25106da2a4ffbbf69a2b5c5d9c727cef68783
+ * body-sha256: 0fd52d537b92137bc3f07b99d81de27c358a7ccd574311fd6e15d3eed4bb1340
  */
 #include "toda3_quadratic.h"
 
@@ -195,13 +195,18 @@ static void toda3_quadratic_train(toda3_quadratic_memory *memory, int component)
         }
 }
 
+/* Drop what is old, if so many values would not fit into the history. */
+static void toda3_quadratic_make_room(toda3_quadratic_memory *memory, int values)
+{
+    if (memory->count + values <= 192) return;
+    memmove(memory->past, memory->past + memory->count - 96, 96 * sizeof memory->past[0]);
+    memory->count = 96;
+}
+
 /* Add a value to the history. */
 static void toda3_quadratic_record(toda3_quadratic_memory *memory, const double value[5])
 {
-    if (memory->count == 192) {
-        memmove(memory->past, memory->past + 192 - 96, 96 * sizeof memory->past[0]);
-        memory->count = 96;
-    }
+    toda3_quadratic_make_room(memory, 1);
     memcpy(memory->past[memory->count++], value, 5 * sizeof value[0]);
 }
 

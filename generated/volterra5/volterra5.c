@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: ee6c177de56bb6aa16e7bd0dd73f4a52e3cdb741bf45b9edfeda8b12c302704e
+ * body-sha256: f67de47d215ccaa1e67c0720564994322ca0a55449c4bdd86dd358dc757a3683
  */
 #include "volterra5.h"
 
@@ -347,13 +347,18 @@ static void volterra5_train(volterra5_memory *memory, int component)
         }
 }
 
+/* Drop what is old, if so many values would not fit into the history. */
+static void volterra5_make_room(volterra5_memory *memory, int values)
+{
+    if (memory->count + values <= 192) return;
+    memmove(memory->past, memory->past + memory->count - 96, 96 * sizeof memory->past[0]);
+    memory->count = 96;
+}
+
 /* Add a value to the history. */
 static void volterra5_record(volterra5_memory *memory, const double value[5])
 {
-    if (memory->count == 192) {
-        memmove(memory->past, memory->past + 192 - 96, 96 * sizeof memory->past[0]);
-        memory->count = 96;
-    }
+    volterra5_make_room(memory, 1);
     memcpy(memory->past[memory->count++], value, 5 * sizeof value[0]);
 }
 
@@ -994,6 +999,15 @@ static void volterra5_foresee(const volterra5_memory *memory, volterra5_lanes we
     }
 }
 
+/* volterra5_record for the values of all lanes, one after the other. */
+static void volterra5_record_lanes(volterra5_memory *memory, volterra5_lanes y[restrict 5])
+{
+    volterra5_make_room(memory, volterra5_LANES);
+    for (int lane = 0; lane < volterra5_LANES; ++lane)
+        for (int i = 0; i < 5; ++i) memory->past[memory->count + lane][i] = y[i][lane];
+    memory->count += volterra5_LANES;
+}
+
 /* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
    method, to leading order. */
 static void volterra5_march(const volterra5_solver *s, volterra5_table *table, volterra5_model model[1])
@@ -1034,7 +1048,7 @@ static int volterra5_block(volterra5_solver *s, volterra5_table *table, int most
 {
     volterra5_model model[1];
     volterra5_lanes sizes;
-    double x[5], carry[5], value[5], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
+    double x[5], carry[5], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
     if (!s->foreseeing) volterra5_march(s, table, model);
     for (int stage = 0; stage < 1; ++stage) {
@@ -1068,10 +1082,7 @@ static int volterra5_block(volterra5_solver *s, volterra5_table *table, int most
     s->steps += volterra5_LANES;
     for (int stage = 0; stage < 1; ++stage) {
         volterra5_memory *memory = &s->memory[stage];
-        for (int lane = 0; lane < volterra5_LANES; ++lane) {
-            for (int i = 0; i < 5; ++i) value[i] = model[stage].y[i][lane];
-            volterra5_record(memory, value);
-        }
+        volterra5_record_lanes(memory, model[stage].y);
         memory->slow = passes > 1 ? memory->slow + volterra5_LANES : 0;
         if (memory->slow > memory->patience && s->foreseeing) volterra5_fit(memory);
     }

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 0222e94c77583e9bfc68c2aa36186a7ff52da1dada0689c327b9170431408177
+ * body-sha256: 25258e9f6ecb03ced90cdf5775ba58e9612e295ebf19679abf46f049b2f6757d
  */
 #include "vortices3.h"
 
@@ -854,13 +854,18 @@ static void vortices3_train(vortices3_memory *memory, int component)
         }
 }
 
+/* Drop what is old, if so many values would not fit into the history. */
+static void vortices3_make_room(vortices3_memory *memory, int values)
+{
+    if (memory->count + values <= 192) return;
+    memmove(memory->past, memory->past + memory->count - 96, 96 * sizeof memory->past[0]);
+    memory->count = 96;
+}
+
 /* Add a value to the history. */
 static void vortices3_record(vortices3_memory *memory, const double value[6])
 {
-    if (memory->count == 192) {
-        memmove(memory->past, memory->past + 192 - 96, 96 * sizeof memory->past[0]);
-        memory->count = 96;
-    }
+    vortices3_make_room(memory, 1);
     memcpy(memory->past[memory->count++], value, 6 * sizeof value[0]);
 }
 
@@ -2046,6 +2051,15 @@ static void vortices3_foresee(const vortices3_memory *memory, vortices3_lanes we
     }
 }
 
+/* vortices3_record for the values of all lanes, one after the other. */
+static void vortices3_record_lanes(vortices3_memory *memory, vortices3_lanes y[restrict 6])
+{
+    vortices3_make_room(memory, vortices3_LANES);
+    for (int lane = 0; lane < vortices3_LANES; ++lane)
+        for (int i = 0; i < 6; ++i) memory->past[memory->count + lane][i] = y[i][lane];
+    memory->count += vortices3_LANES;
+}
+
 /* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
    method, to leading order. */
 static void vortices3_march(const vortices3_solver *s, vortices3_table *table, vortices3_model model[1])
@@ -2086,7 +2100,7 @@ static int vortices3_block(vortices3_solver *s, vortices3_table *table, int most
 {
     vortices3_model model[1];
     vortices3_lanes sizes;
-    double x[6], carry[6], value[6], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
+    double x[6], carry[6], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
     if (!s->foreseeing) vortices3_march(s, table, model);
     for (int stage = 0; stage < 1; ++stage) {
@@ -2120,10 +2134,7 @@ static int vortices3_block(vortices3_solver *s, vortices3_table *table, int most
     s->steps += vortices3_LANES;
     for (int stage = 0; stage < 1; ++stage) {
         vortices3_memory *memory = &s->memory[stage];
-        for (int lane = 0; lane < vortices3_LANES; ++lane) {
-            for (int i = 0; i < 6; ++i) value[i] = model[stage].y[i][lane];
-            vortices3_record(memory, value);
-        }
+        vortices3_record_lanes(memory, model[stage].y);
         memory->slow = passes > 1 ? memory->slow + vortices3_LANES : 0;
         if (memory->slow > memory->patience && s->foreseeing) vortices3_fit(memory);
     }
