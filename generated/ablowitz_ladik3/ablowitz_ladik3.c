@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 94ae6281ea85d98d414c5f75e94575caeb2575144bfdb5a733bfdc85a195e5af
+ * body-sha256: ca53df458271a4fbb04a1b8f3307b691f8cf1d22572b4db3bbf067fbe294c23d
  */
 #include "ablowitz_ladik3.h"
 
@@ -514,8 +514,7 @@ static ablowitz_ladik3_status ablowitz_ladik3_attempt(ablowitz_ladik3_solver *s,
     return ablowitz_ladik3_NO_CONVERGENCE;
 }
 
-/* The 5 stages of one step. If one fails, the state is as before the step.
-   As a guess from earlier steps may mislead, a stage that fails is tried once more without. */
+/* The 5 stages of one step. If one fails, the state is as before the step. */
 static ablowitz_ladik3_status ablowitz_ladik3_stages(ablowitz_ladik3_solver *s)
 {
     double x[6], carry[6];
@@ -523,6 +522,7 @@ static ablowitz_ladik3_status ablowitz_ladik3_stages(ablowitz_ladik3_solver *s)
     memcpy(carry, s->carry, sizeof carry);
     for (int stage = 0; stage < 5; ++stage) {
         ablowitz_ladik3_status status = ablowitz_ladik3_attempt(s, stage);
+        /* A guess from earlier steps may have misled it: once more without. */
         if (status != ablowitz_ladik3_OK && s->memory[stage].count > 0) {
             memset(&s->memory[stage], 0, sizeof s->memory[stage]);
             status = ablowitz_ladik3_attempt(s, stage);

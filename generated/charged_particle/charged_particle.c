@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 5bcb83e9069bfa4eb615f9c415a8d5cdb769db328d8c064c67d5763eaea075ec
+ * body-sha256: eb9b55ddd005a7080e5cc3623c79c6308d0b6248eca92019383cd8f90d43690d
  */
 #include "charged_particle.h"
 
@@ -508,8 +508,7 @@ static charged_particle_status charged_particle_attempt(charged_particle_solver 
     return charged_particle_NO_CONVERGENCE;
 }
 
-/* The 1 stages of one step. If one fails, the state is as before the step.
-   As a guess from earlier steps may mislead, a stage that fails is tried once more without. */
+/* The 1 stages of one step. If one fails, the state is as before the step. */
 static charged_particle_status charged_particle_stages(charged_particle_solver *s)
 {
     double x[6], carry[6];
@@ -517,6 +516,7 @@ static charged_particle_status charged_particle_stages(charged_particle_solver *
     memcpy(carry, s->carry, sizeof carry);
     for (int stage = 0; stage < 1; ++stage) {
         charged_particle_status status = charged_particle_attempt(s, stage);
+        /* A guess from earlier steps may have misled it: once more without. */
         if (status != charged_particle_OK && s->memory[stage].count > 0) {
             memset(&s->memory[stage], 0, sizeof s->memory[stage]);
             status = charged_particle_attempt(s, stage);

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: ebbe4e75cc93469f74989f11a52aa8d83dc65d6bc88fee6328e77c29c25b20d6
+ * body-sha256: ed2835ca329214b3cb36020895b3f43d20fb5d3a28c1dc7c43db9e530de05d80
  */
 #include "cyclotron.h"
 
@@ -343,8 +343,7 @@ static cyclotron_status cyclotron_attempt(cyclotron_solver *s, int stage)
     return cyclotron_NO_CONVERGENCE;
 }
 
-/* The 1 stages of one step. If one fails, the state is as before the step.
-   As a guess from earlier steps may mislead, a stage that fails is tried once more without. */
+/* The 1 stages of one step. If one fails, the state is as before the step. */
 static cyclotron_status cyclotron_stages(cyclotron_solver *s)
 {
     double x[3], carry[3];
@@ -352,6 +351,7 @@ static cyclotron_status cyclotron_stages(cyclotron_solver *s)
     memcpy(carry, s->carry, sizeof carry);
     for (int stage = 0; stage < 1; ++stage) {
         cyclotron_status status = cyclotron_attempt(s, stage);
+        /* A guess from earlier steps may have misled it: once more without. */
         if (status != cyclotron_OK && s->memory[stage].count > 0) {
             memset(&s->memory[stage], 0, sizeof s->memory[stage]);
             status = cyclotron_attempt(s, stage);
@@ -1001,12 +1001,13 @@ static void cyclotron_group_predict(cyclotron_group *group, int stage, cyclotron
     if (group->fitting[stage]) cyclotron_group_foresee(group, stage, y);
     else cyclotron_group_extrapolate(group, stage, y);
     for (int lane = 0; lane < cyclotron_LANES; ++lane) {
-        double distance = 0.0, size = 0.0;
+        double guess[3], state[3];
         for (int i = 0; i < 3; ++i) {
-            distance += fabs(y[i][lane] - group->x[i][lane]);
-            size += fabs(group->x[i][lane]);
+            guess[i] = y[i][lane];
+            state[i] = group->x[i][lane];
         }
-        for (int i = 0; i < 3 && !(distance <= 4.0 * size); ++i) y[i][lane] = group->x[i][lane];
+        const int near = cyclotron_near(guess, state);
+        for (int i = 0; i < 3 && !near; ++i) y[i][lane] = state[i];
     }
 }
 

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 2ff2a1b6e5752db5a2366eabdc689fad8b07c69e0ac1a3954c82edbf134c9820
+ * body-sha256: bd2555c0bdb5e398c4dcaf6d7e09190f0689a70da26ddf3755c8adb04e1f374e
  */
 #include "engel_geodesics.h"
 
@@ -383,8 +383,7 @@ static engel_geodesics_status engel_geodesics_attempt(engel_geodesics_solver *s,
     return engel_geodesics_NO_CONVERGENCE;
 }
 
-/* The 1 stages of one step. If one fails, the state is as before the step.
-   As a guess from earlier steps may mislead, a stage that fails is tried once more without. */
+/* The 1 stages of one step. If one fails, the state is as before the step. */
 static engel_geodesics_status engel_geodesics_stages(engel_geodesics_solver *s)
 {
     double x[4], carry[4];
@@ -392,6 +391,7 @@ static engel_geodesics_status engel_geodesics_stages(engel_geodesics_solver *s)
     memcpy(carry, s->carry, sizeof carry);
     for (int stage = 0; stage < 1; ++stage) {
         engel_geodesics_status status = engel_geodesics_attempt(s, stage);
+        /* A guess from earlier steps may have misled it: once more without. */
         if (status != engel_geodesics_OK && s->memory[stage].count > 0) {
             memset(&s->memory[stage], 0, sizeof s->memory[stage]);
             status = engel_geodesics_attempt(s, stage);
@@ -1113,12 +1113,13 @@ static void engel_geodesics_group_predict(engel_geodesics_group *group, int stag
     if (group->fitting[stage]) engel_geodesics_group_foresee(group, stage, y);
     else engel_geodesics_group_extrapolate(group, stage, y);
     for (int lane = 0; lane < engel_geodesics_LANES; ++lane) {
-        double distance = 0.0, size = 0.0;
+        double guess[4], state[4];
         for (int i = 0; i < 4; ++i) {
-            distance += fabs(y[i][lane] - group->x[i][lane]);
-            size += fabs(group->x[i][lane]);
+            guess[i] = y[i][lane];
+            state[i] = group->x[i][lane];
         }
-        for (int i = 0; i < 4 && !(distance <= 4.0 * size); ++i) y[i][lane] = group->x[i][lane];
+        const int near = engel_geodesics_near(guess, state);
+        for (int i = 0; i < 4 && !near; ++i) y[i][lane] = state[i];
     }
 }
 

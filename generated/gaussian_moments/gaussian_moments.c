@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 3cae001b47d7adf5db523f99d7fecdb7318171be52b1d66edb63962170685647
+ * body-sha256: d7fdc53bef0d6f162a4821f5c1f2db33dd1aaf9679ca986576f4847d14924388
  */
 #include "gaussian_moments.h"
 
@@ -490,8 +490,7 @@ static gaussian_moments_status gaussian_moments_attempt(gaussian_moments_solver 
     return gaussian_moments_NO_CONVERGENCE;
 }
 
-/* The 1 stages of one step. If one fails, the state is as before the step.
-   As a guess from earlier steps may mislead, a stage that fails is tried once more without. */
+/* The 1 stages of one step. If one fails, the state is as before the step. */
 static gaussian_moments_status gaussian_moments_stages(gaussian_moments_solver *s)
 {
     double x[3], carry[3];
@@ -499,6 +498,7 @@ static gaussian_moments_status gaussian_moments_stages(gaussian_moments_solver *
     memcpy(carry, s->carry, sizeof carry);
     for (int stage = 0; stage < 1; ++stage) {
         gaussian_moments_status status = gaussian_moments_attempt(s, stage);
+        /* A guess from earlier steps may have misled it: once more without. */
         if (status != gaussian_moments_OK && s->memory[stage].count > 0) {
             memset(&s->memory[stage], 0, sizeof s->memory[stage]);
             status = gaussian_moments_attempt(s, stage);
@@ -1241,12 +1241,13 @@ static void gaussian_moments_group_predict(gaussian_moments_group *group, int st
     if (group->fitting[stage]) gaussian_moments_group_foresee(group, stage, y);
     else gaussian_moments_group_extrapolate(group, stage, y);
     for (int lane = 0; lane < gaussian_moments_LANES; ++lane) {
-        double distance = 0.0, size = 0.0;
+        double guess[3], state[3];
         for (int i = 0; i < 3; ++i) {
-            distance += fabs(y[i][lane] - group->x[i][lane]);
-            size += fabs(group->x[i][lane]);
+            guess[i] = y[i][lane];
+            state[i] = group->x[i][lane];
         }
-        for (int i = 0; i < 3 && !(distance <= 4.0 * size); ++i) y[i][lane] = group->x[i][lane];
+        const int near = gaussian_moments_near(guess, state);
+        for (int i = 0; i < 3 && !near; ++i) y[i][lane] = state[i];
     }
 }
 

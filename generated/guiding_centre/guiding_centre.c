@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 7181b3232f4abbb4af726124e739b63640dc191e0d0cb95238bb59853e3e0299
+ * body-sha256: d72dd06fca8882b446b4d1a10ccfe69a26d3585101bb02dabefdb961d71a36c5
  */
 #include "guiding_centre.h"
 
@@ -617,8 +617,7 @@ static guiding_centre_status guiding_centre_attempt(guiding_centre_solver *s, in
     return guiding_centre_NO_CONVERGENCE;
 }
 
-/* The 5 stages of one step. If one fails, the state is as before the step.
-   As a guess from earlier steps may mislead, a stage that fails is tried once more without. */
+/* The 5 stages of one step. If one fails, the state is as before the step. */
 static guiding_centre_status guiding_centre_stages(guiding_centre_solver *s)
 {
     double x[4], carry[4];
@@ -626,6 +625,7 @@ static guiding_centre_status guiding_centre_stages(guiding_centre_solver *s)
     memcpy(carry, s->carry, sizeof carry);
     for (int stage = 0; stage < 5; ++stage) {
         guiding_centre_status status = guiding_centre_attempt(s, stage);
+        /* A guess from earlier steps may have misled it: once more without. */
         if (status != guiding_centre_OK && s->memory[stage].count > 0) {
             memset(&s->memory[stage], 0, sizeof s->memory[stage]);
             status = guiding_centre_attempt(s, stage);

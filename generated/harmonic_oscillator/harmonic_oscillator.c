@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 4aff9e530b7e06ae26f9cc0b78dfc6492b8a81a25a59be1f056f846ccc14ce9d
+ * body-sha256: 625813c44835f3efbb82ace6b7f24e586b5bc1a0e1774cdfd733ba74f1718b0f
  */
 #include "harmonic_oscillator.h"
 
@@ -321,8 +321,7 @@ static harmonic_oscillator_status harmonic_oscillator_attempt(harmonic_oscillato
     return harmonic_oscillator_NO_CONVERGENCE;
 }
 
-/* The 1 stages of one step. If one fails, the state is as before the step.
-   As a guess from earlier steps may mislead, a stage that fails is tried once more without. */
+/* The 1 stages of one step. If one fails, the state is as before the step. */
 static harmonic_oscillator_status harmonic_oscillator_stages(harmonic_oscillator_solver *s)
 {
     double x[2], carry[2];
@@ -330,6 +329,7 @@ static harmonic_oscillator_status harmonic_oscillator_stages(harmonic_oscillator
     memcpy(carry, s->carry, sizeof carry);
     for (int stage = 0; stage < 1; ++stage) {
         harmonic_oscillator_status status = harmonic_oscillator_attempt(s, stage);
+        /* A guess from earlier steps may have misled it: once more without. */
         if (status != harmonic_oscillator_OK && s->memory[stage].count > 0) {
             memset(&s->memory[stage], 0, sizeof s->memory[stage]);
             status = harmonic_oscillator_attempt(s, stage);
@@ -938,12 +938,13 @@ static void harmonic_oscillator_group_predict(harmonic_oscillator_group *group, 
     if (group->fitting[stage]) harmonic_oscillator_group_foresee(group, stage, y);
     else harmonic_oscillator_group_extrapolate(group, stage, y);
     for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane) {
-        double distance = 0.0, size = 0.0;
+        double guess[2], state[2];
         for (int i = 0; i < 2; ++i) {
-            distance += fabs(y[i][lane] - group->x[i][lane]);
-            size += fabs(group->x[i][lane]);
+            guess[i] = y[i][lane];
+            state[i] = group->x[i][lane];
         }
-        for (int i = 0; i < 2 && !(distance <= 4.0 * size); ++i) y[i][lane] = group->x[i][lane];
+        const int near = harmonic_oscillator_near(guess, state);
+        for (int i = 0; i < 2 && !near; ++i) y[i][lane] = state[i];
     }
 }
 

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 19238f4b92f1d023ad66a12d61c909106068eaeca6191488f1702ad2edae78b3
+ * body-sha256: 0949aee70059dbc63c2a182a71cade2ebac8396df8f01daba49b788fbc6887ce
  */
 #include "henon_heiles.h"
 
@@ -425,8 +425,7 @@ static henon_heiles_status henon_heiles_attempt(henon_heiles_solver *s, int stag
     return henon_heiles_NO_CONVERGENCE;
 }
 
-/* The 1 stages of one step. If one fails, the state is as before the step.
-   As a guess from earlier steps may mislead, a stage that fails is tried once more without. */
+/* The 1 stages of one step. If one fails, the state is as before the step. */
 static henon_heiles_status henon_heiles_stages(henon_heiles_solver *s)
 {
     double x[4], carry[4];
@@ -434,6 +433,7 @@ static henon_heiles_status henon_heiles_stages(henon_heiles_solver *s)
     memcpy(carry, s->carry, sizeof carry);
     for (int stage = 0; stage < 1; ++stage) {
         henon_heiles_status status = henon_heiles_attempt(s, stage);
+        /* A guess from earlier steps may have misled it: once more without. */
         if (status != henon_heiles_OK && s->memory[stage].count > 0) {
             memset(&s->memory[stage], 0, sizeof s->memory[stage]);
             status = henon_heiles_attempt(s, stage);
@@ -1170,12 +1170,13 @@ static void henon_heiles_group_predict(henon_heiles_group *group, int stage, hen
     if (group->fitting[stage]) henon_heiles_group_foresee(group, stage, y);
     else henon_heiles_group_extrapolate(group, stage, y);
     for (int lane = 0; lane < henon_heiles_LANES; ++lane) {
-        double distance = 0.0, size = 0.0;
+        double guess[4], state[4];
         for (int i = 0; i < 4; ++i) {
-            distance += fabs(y[i][lane] - group->x[i][lane]);
-            size += fabs(group->x[i][lane]);
+            guess[i] = y[i][lane];
+            state[i] = group->x[i][lane];
         }
-        for (int i = 0; i < 4 && !(distance <= 4.0 * size); ++i) y[i][lane] = group->x[i][lane];
+        const int near = henon_heiles_near(guess, state);
+        for (int i = 0; i < 4 && !near; ++i) y[i][lane] = state[i];
     }
 }
 

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: e5e9d50e0eef2a53641b2766a6085acb27f9efb04e12b2cce1ad7c34ef8df3c6
+ * body-sha256: 33f88df6ed1e906799d412d1ae2150f97269e8a7a4f1ff5d94a185f5b95bf04c
  */
 #include "kepler.h"
 
@@ -736,8 +736,7 @@ static kepler_status kepler_attempt(kepler_solver *s, int stage)
     return kepler_NO_CONVERGENCE;
 }
 
-/* The 1 stages of one step. If one fails, the state is as before the step.
-   As a guess from earlier steps may mislead, a stage that fails is tried once more without. */
+/* The 1 stages of one step. If one fails, the state is as before the step. */
 static kepler_status kepler_stages(kepler_solver *s)
 {
     double x[4], carry[4];
@@ -745,6 +744,7 @@ static kepler_status kepler_stages(kepler_solver *s)
     memcpy(carry, s->carry, sizeof carry);
     for (int stage = 0; stage < 1; ++stage) {
         kepler_status status = kepler_attempt(s, stage);
+        /* A guess from earlier steps may have misled it: once more without. */
         if (status != kepler_OK && s->memory[stage].count > 0) {
             memset(&s->memory[stage], 0, sizeof s->memory[stage]);
             status = kepler_attempt(s, stage);
@@ -1692,12 +1692,13 @@ static void kepler_group_predict(kepler_group *group, int stage, kepler_lanes y[
     if (group->fitting[stage]) kepler_group_foresee(group, stage, y);
     else kepler_group_extrapolate(group, stage, y);
     for (int lane = 0; lane < kepler_LANES; ++lane) {
-        double distance = 0.0, size = 0.0;
+        double guess[4], state[4];
         for (int i = 0; i < 4; ++i) {
-            distance += fabs(y[i][lane] - group->x[i][lane]);
-            size += fabs(group->x[i][lane]);
+            guess[i] = y[i][lane];
+            state[i] = group->x[i][lane];
         }
-        for (int i = 0; i < 4 && !(distance <= 4.0 * size); ++i) y[i][lane] = group->x[i][lane];
+        const int near = kepler_near(guess, state);
+        for (int i = 0; i < 4 && !near; ++i) y[i][lane] = state[i];
     }
 }
 

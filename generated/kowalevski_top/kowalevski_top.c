@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 840e143be188b6d0dde91e4a9a2faab7dbd334ce91d0a39d69e67f48156b444a
+ * body-sha256: cc5e70dcfd647edd048a5c60d33d7a0b8bd19905d062a9f25c84a8cb4a190455
  */
 #include "kowalevski_top.h"
 
@@ -1249,8 +1249,7 @@ static kowalevski_top_status kowalevski_top_attempt(kowalevski_top_solver *s, in
     return kowalevski_top_NO_CONVERGENCE;
 }
 
-/* The 1 stages of one step. If one fails, the state is as before the step.
-   As a guess from earlier steps may mislead, a stage that fails is tried once more without. */
+/* The 1 stages of one step. If one fails, the state is as before the step. */
 static kowalevski_top_status kowalevski_top_stages(kowalevski_top_solver *s)
 {
     double x[6], carry[6];
@@ -1258,6 +1257,7 @@ static kowalevski_top_status kowalevski_top_stages(kowalevski_top_solver *s)
     memcpy(carry, s->carry, sizeof carry);
     for (int stage = 0; stage < 1; ++stage) {
         kowalevski_top_status status = kowalevski_top_attempt(s, stage);
+        /* A guess from earlier steps may have misled it: once more without. */
         if (status != kowalevski_top_OK && s->memory[stage].count > 0) {
             memset(&s->memory[stage], 0, sizeof s->memory[stage]);
             status = kowalevski_top_attempt(s, stage);
@@ -2696,12 +2696,13 @@ static void kowalevski_top_group_predict(kowalevski_top_group *group, int stage,
     if (group->fitting[stage]) kowalevski_top_group_foresee(group, stage, y);
     else kowalevski_top_group_extrapolate(group, stage, y);
     for (int lane = 0; lane < kowalevski_top_LANES; ++lane) {
-        double distance = 0.0, size = 0.0;
+        double guess[6], state[6];
         for (int i = 0; i < 6; ++i) {
-            distance += fabs(y[i][lane] - group->x[i][lane]);
-            size += fabs(group->x[i][lane]);
+            guess[i] = y[i][lane];
+            state[i] = group->x[i][lane];
         }
-        for (int i = 0; i < 6 && !(distance <= 4.0 * size); ++i) y[i][lane] = group->x[i][lane];
+        const int near = kowalevski_top_near(guess, state);
+        for (int i = 0; i < 6 && !near; ++i) y[i][lane] = state[i];
     }
 }
 

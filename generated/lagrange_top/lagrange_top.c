@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 35ec3efc8ea50cd7e0cead575bc2d23c89265f228e23cf418559730d7f6594e7
+ * body-sha256: 0a54136fc39272744b98af8c6e75a63d707cd606b77409eea7d6915175236097
  */
 #include "lagrange_top.h"
 
@@ -843,8 +843,7 @@ static lagrange_top_status lagrange_top_attempt(lagrange_top_solver *s, int stag
     return lagrange_top_NO_CONVERGENCE;
 }
 
-/* The 1 stages of one step. If one fails, the state is as before the step.
-   As a guess from earlier steps may mislead, a stage that fails is tried once more without. */
+/* The 1 stages of one step. If one fails, the state is as before the step. */
 static lagrange_top_status lagrange_top_stages(lagrange_top_solver *s)
 {
     double x[6], carry[6];
@@ -852,6 +851,7 @@ static lagrange_top_status lagrange_top_stages(lagrange_top_solver *s)
     memcpy(carry, s->carry, sizeof carry);
     for (int stage = 0; stage < 1; ++stage) {
         lagrange_top_status status = lagrange_top_attempt(s, stage);
+        /* A guess from earlier steps may have misled it: once more without. */
         if (status != lagrange_top_OK && s->memory[stage].count > 0) {
             memset(&s->memory[stage], 0, sizeof s->memory[stage]);
             status = lagrange_top_attempt(s, stage);
@@ -1971,12 +1971,13 @@ static void lagrange_top_group_predict(lagrange_top_group *group, int stage, lag
     if (group->fitting[stage]) lagrange_top_group_foresee(group, stage, y);
     else lagrange_top_group_extrapolate(group, stage, y);
     for (int lane = 0; lane < lagrange_top_LANES; ++lane) {
-        double distance = 0.0, size = 0.0;
+        double guess[6], state[6];
         for (int i = 0; i < 6; ++i) {
-            distance += fabs(y[i][lane] - group->x[i][lane]);
-            size += fabs(group->x[i][lane]);
+            guess[i] = y[i][lane];
+            state[i] = group->x[i][lane];
         }
-        for (int i = 0; i < 6 && !(distance <= 4.0 * size); ++i) y[i][lane] = group->x[i][lane];
+        const int near = lagrange_top_near(guess, state);
+        for (int i = 0; i < 6 && !near; ++i) y[i][lane] = state[i];
     }
 }
 

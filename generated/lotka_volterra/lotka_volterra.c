@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: e1ea417ccbd8a0733e1257a7b25719447aada894a56231b1fea853295024eecc
+ * body-sha256: 4b6a35441ef51901d366918ef13ebe94d04286f0e93f0df3dc44bd1373a69cbc
  */
 #include "lotka_volterra.h"
 
@@ -359,8 +359,7 @@ static lotka_volterra_status lotka_volterra_attempt(lotka_volterra_solver *s, in
     return lotka_volterra_NO_CONVERGENCE;
 }
 
-/* The 1 stages of one step. If one fails, the state is as before the step.
-   As a guess from earlier steps may mislead, a stage that fails is tried once more without. */
+/* The 1 stages of one step. If one fails, the state is as before the step. */
 static lotka_volterra_status lotka_volterra_stages(lotka_volterra_solver *s)
 {
     double x[3], carry[3];
@@ -368,6 +367,7 @@ static lotka_volterra_status lotka_volterra_stages(lotka_volterra_solver *s)
     memcpy(carry, s->carry, sizeof carry);
     for (int stage = 0; stage < 1; ++stage) {
         lotka_volterra_status status = lotka_volterra_attempt(s, stage);
+        /* A guess from earlier steps may have misled it: once more without. */
         if (status != lotka_volterra_OK && s->memory[stage].count > 0) {
             memset(&s->memory[stage], 0, sizeof s->memory[stage]);
             status = lotka_volterra_attempt(s, stage);
@@ -1069,12 +1069,13 @@ static void lotka_volterra_group_predict(lotka_volterra_group *group, int stage,
     if (group->fitting[stage]) lotka_volterra_group_foresee(group, stage, y);
     else lotka_volterra_group_extrapolate(group, stage, y);
     for (int lane = 0; lane < lotka_volterra_LANES; ++lane) {
-        double distance = 0.0, size = 0.0;
+        double guess[3], state[3];
         for (int i = 0; i < 3; ++i) {
-            distance += fabs(y[i][lane] - group->x[i][lane]);
-            size += fabs(group->x[i][lane]);
+            guess[i] = y[i][lane];
+            state[i] = group->x[i][lane];
         }
-        for (int i = 0; i < 3 && !(distance <= 4.0 * size); ++i) y[i][lane] = group->x[i][lane];
+        const int near = lotka_volterra_near(guess, state);
+        for (int i = 0; i < 3 && !near; ++i) y[i][lane] = state[i];
     }
 }
 

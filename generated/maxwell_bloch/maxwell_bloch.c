@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 8ba2881756531f7d4523e30273396e70feddfc66a25ca788863c7e1e410544a4
+ * body-sha256: d1f0737621e0403853098bb73c83b29f3c42336544e47dcd66748d5fa05c9843
  */
 #include "maxwell_bloch.h"
 
@@ -349,8 +349,7 @@ static maxwell_bloch_status maxwell_bloch_attempt(maxwell_bloch_solver *s, int s
     return maxwell_bloch_NO_CONVERGENCE;
 }
 
-/* The 1 stages of one step. If one fails, the state is as before the step.
-   As a guess from earlier steps may mislead, a stage that fails is tried once more without. */
+/* The 1 stages of one step. If one fails, the state is as before the step. */
 static maxwell_bloch_status maxwell_bloch_stages(maxwell_bloch_solver *s)
 {
     double x[3], carry[3];
@@ -358,6 +357,7 @@ static maxwell_bloch_status maxwell_bloch_stages(maxwell_bloch_solver *s)
     memcpy(carry, s->carry, sizeof carry);
     for (int stage = 0; stage < 1; ++stage) {
         maxwell_bloch_status status = maxwell_bloch_attempt(s, stage);
+        /* A guess from earlier steps may have misled it: once more without. */
         if (status != maxwell_bloch_OK && s->memory[stage].count > 0) {
             memset(&s->memory[stage], 0, sizeof s->memory[stage]);
             status = maxwell_bloch_attempt(s, stage);
@@ -1019,12 +1019,13 @@ static void maxwell_bloch_group_predict(maxwell_bloch_group *group, int stage, m
     if (group->fitting[stage]) maxwell_bloch_group_foresee(group, stage, y);
     else maxwell_bloch_group_extrapolate(group, stage, y);
     for (int lane = 0; lane < maxwell_bloch_LANES; ++lane) {
-        double distance = 0.0, size = 0.0;
+        double guess[3], state[3];
         for (int i = 0; i < 3; ++i) {
-            distance += fabs(y[i][lane] - group->x[i][lane]);
-            size += fabs(group->x[i][lane]);
+            guess[i] = y[i][lane];
+            state[i] = group->x[i][lane];
         }
-        for (int i = 0; i < 3 && !(distance <= 4.0 * size); ++i) y[i][lane] = group->x[i][lane];
+        const int near = maxwell_bloch_near(guess, state);
+        for (int i = 0; i < 3 && !near; ++i) y[i][lane] = state[i];
     }
 }
 

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 502b0ee2207b10694346c3eb601167adcfa695a0bb1c2c40da069c1b8f18c572
+ * body-sha256: 2dce1ca1867321fc305079658518757743013e2cf0609f3fe04d4675e038d9d8
  */
 #include "nambu_pendulum.h"
 
@@ -438,8 +438,7 @@ static nambu_pendulum_status nambu_pendulum_attempt(nambu_pendulum_solver *s, in
     return nambu_pendulum_NO_CONVERGENCE;
 }
 
-/* The 1 stages of one step. If one fails, the state is as before the step.
-   As a guess from earlier steps may mislead, a stage that fails is tried once more without. */
+/* The 1 stages of one step. If one fails, the state is as before the step. */
 static nambu_pendulum_status nambu_pendulum_stages(nambu_pendulum_solver *s)
 {
     double x[3], carry[3];
@@ -447,6 +446,7 @@ static nambu_pendulum_status nambu_pendulum_stages(nambu_pendulum_solver *s)
     memcpy(carry, s->carry, sizeof carry);
     for (int stage = 0; stage < 1; ++stage) {
         nambu_pendulum_status status = nambu_pendulum_attempt(s, stage);
+        /* A guess from earlier steps may have misled it: once more without. */
         if (status != nambu_pendulum_OK && s->memory[stage].count > 0) {
             memset(&s->memory[stage], 0, sizeof s->memory[stage]);
             status = nambu_pendulum_attempt(s, stage);

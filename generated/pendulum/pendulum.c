@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: df86d74699a9bfc2bbbe874e4b990dc4742f7c82ff5a3a0493151d17d51add44
+ * body-sha256: 84116fa656590946e508d2f3cdab24b46f75a724f0a31f10ee651c427eb24c82
  */
 #include "pendulum.h"
 
@@ -354,8 +354,7 @@ static pendulum_status pendulum_attempt(pendulum_solver *s, int stage)
     return pendulum_NO_CONVERGENCE;
 }
 
-/* The 1 stages of one step. If one fails, the state is as before the step.
-   As a guess from earlier steps may mislead, a stage that fails is tried once more without. */
+/* The 1 stages of one step. If one fails, the state is as before the step. */
 static pendulum_status pendulum_stages(pendulum_solver *s)
 {
     double x[2], carry[2];
@@ -363,6 +362,7 @@ static pendulum_status pendulum_stages(pendulum_solver *s)
     memcpy(carry, s->carry, sizeof carry);
     for (int stage = 0; stage < 1; ++stage) {
         pendulum_status status = pendulum_attempt(s, stage);
+        /* A guess from earlier steps may have misled it: once more without. */
         if (status != pendulum_OK && s->memory[stage].count > 0) {
             memset(&s->memory[stage], 0, sizeof s->memory[stage]);
             status = pendulum_attempt(s, stage);
@@ -1032,12 +1032,13 @@ static void pendulum_group_predict(pendulum_group *group, int stage, pendulum_la
     if (group->fitting[stage]) pendulum_group_foresee(group, stage, y);
     else pendulum_group_extrapolate(group, stage, y);
     for (int lane = 0; lane < pendulum_LANES; ++lane) {
-        double distance = 0.0, size = 0.0;
+        double guess[2], state[2];
         for (int i = 0; i < 2; ++i) {
-            distance += fabs(y[i][lane] - group->x[i][lane]);
-            size += fabs(group->x[i][lane]);
+            guess[i] = y[i][lane];
+            state[i] = group->x[i][lane];
         }
-        for (int i = 0; i < 2 && !(distance <= 4.0 * size); ++i) y[i][lane] = group->x[i][lane];
+        const int near = pendulum_near(guess, state);
+        for (int i = 0; i < 2 && !near; ++i) y[i][lane] = state[i];
     }
 }
 

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 5defa8549ea0f665e83321fddab8cd0b09289361b69532238ee09ad0cc363686
+ * body-sha256: dea92fb9e97e70135729adbc10049fcd90be792e741960727ff7ec138a60b5bd
  */
 #include "pendulum_euler.h"
 
@@ -81,7 +81,7 @@ static pendulum_euler_status pendulum_euler_stages(pendulum_euler_solver *s)
     memcpy(x, s->x, sizeof x);
     memcpy(carry, s->carry, sizeof carry);
     for (int stage = 0; stage < 1; ++stage) {
-        const pendulum_euler_status status = pendulum_euler_attempt(s, stage);
+        pendulum_euler_status status = pendulum_euler_attempt(s, stage);
         if (status != pendulum_euler_OK) {
             memcpy(s->x, x, sizeof x);
             memcpy(s->carry, carry, sizeof carry);

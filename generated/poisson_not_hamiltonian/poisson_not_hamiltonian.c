@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 0bf10ce96af080847e76eac53451e19e51c5c635ede091fcb61e4d60acfb258e
+ * body-sha256: 3115f4aeac2bb27b4e5f4bbc267fe548ee03ae324aac311889424561da098a64
  */
 #include "poisson_not_hamiltonian.h"
 
@@ -457,8 +457,7 @@ static poisson_not_hamiltonian_status poisson_not_hamiltonian_attempt(poisson_no
     return poisson_not_hamiltonian_NO_CONVERGENCE;
 }
 
-/* The 1 stages of one step. If one fails, the state is as before the step.
-   As a guess from earlier steps may mislead, a stage that fails is tried once more without. */
+/* The 1 stages of one step. If one fails, the state is as before the step. */
 static poisson_not_hamiltonian_status poisson_not_hamiltonian_stages(poisson_not_hamiltonian_solver *s)
 {
     double x[3], carry[3];
@@ -466,6 +465,7 @@ static poisson_not_hamiltonian_status poisson_not_hamiltonian_stages(poisson_not
     memcpy(carry, s->carry, sizeof carry);
     for (int stage = 0; stage < 1; ++stage) {
         poisson_not_hamiltonian_status status = poisson_not_hamiltonian_attempt(s, stage);
+        /* A guess from earlier steps may have misled it: once more without. */
         if (status != poisson_not_hamiltonian_OK && s->memory[stage].count > 0) {
             memset(&s->memory[stage], 0, sizeof s->memory[stage]);
             status = poisson_not_hamiltonian_attempt(s, stage);
@@ -1333,12 +1333,13 @@ static void poisson_not_hamiltonian_group_predict(poisson_not_hamiltonian_group 
     if (group->fitting[stage]) poisson_not_hamiltonian_group_foresee(group, stage, y);
     else poisson_not_hamiltonian_group_extrapolate(group, stage, y);
     for (int lane = 0; lane < poisson_not_hamiltonian_LANES; ++lane) {
-        double distance = 0.0, size = 0.0;
+        double guess[3], state[3];
         for (int i = 0; i < 3; ++i) {
-            distance += fabs(y[i][lane] - group->x[i][lane]);
-            size += fabs(group->x[i][lane]);
+            guess[i] = y[i][lane];
+            state[i] = group->x[i][lane];
         }
-        for (int i = 0; i < 3 && !(distance <= 4.0 * size); ++i) y[i][lane] = group->x[i][lane];
+        const int near = poisson_not_hamiltonian_near(guess, state);
+        for (int i = 0; i < 3 && !near; ++i) y[i][lane] = state[i];
     }
 }
 

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: f63a0964cf2665dc6965ef9b0fa45123fccef44bcc60229b25af2b79e582d708
+ * body-sha256: 039bd88ff02b80024a7485d18e50a5e15efefc73110fe272ae037a09bdf8d41d
  */
 #include "predator_prey.h"
 
@@ -354,8 +354,7 @@ static predator_prey_status predator_prey_attempt(predator_prey_solver *s, int s
     return predator_prey_NO_CONVERGENCE;
 }
 
-/* The 1 stages of one step. If one fails, the state is as before the step.
-   As a guess from earlier steps may mislead, a stage that fails is tried once more without. */
+/* The 1 stages of one step. If one fails, the state is as before the step. */
 static predator_prey_status predator_prey_stages(predator_prey_solver *s)
 {
     double x[2], carry[2];
@@ -363,6 +362,7 @@ static predator_prey_status predator_prey_stages(predator_prey_solver *s)
     memcpy(carry, s->carry, sizeof carry);
     for (int stage = 0; stage < 1; ++stage) {
         predator_prey_status status = predator_prey_attempt(s, stage);
+        /* A guess from earlier steps may have misled it: once more without. */
         if (status != predator_prey_OK && s->memory[stage].count > 0) {
             memset(&s->memory[stage], 0, sizeof s->memory[stage]);
             status = predator_prey_attempt(s, stage);
@@ -1025,12 +1025,13 @@ static void predator_prey_group_predict(predator_prey_group *group, int stage, p
     if (group->fitting[stage]) predator_prey_group_foresee(group, stage, y);
     else predator_prey_group_extrapolate(group, stage, y);
     for (int lane = 0; lane < predator_prey_LANES; ++lane) {
-        double distance = 0.0, size = 0.0;
+        double guess[2], state[2];
         for (int i = 0; i < 2; ++i) {
-            distance += fabs(y[i][lane] - group->x[i][lane]);
-            size += fabs(group->x[i][lane]);
+            guess[i] = y[i][lane];
+            state[i] = group->x[i][lane];
         }
-        for (int i = 0; i < 2 && !(distance <= 4.0 * size); ++i) y[i][lane] = group->x[i][lane];
+        const int near = predator_prey_near(guess, state);
+        for (int i = 0; i < 2 && !near; ++i) y[i][lane] = state[i];
     }
 }
 

@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 0093157c5bf88e63df168669f3c4d589e30e6b4f876cbab4cf6f046f88ea8b3a
+ * body-sha256: 52f3a460ade2f474aedcd44d2acf276881287e6b2c882c664ff2179ec8a90d17
  */
 #include "rigid_body.h"
 
@@ -622,8 +622,7 @@ static rigid_body_status rigid_body_attempt(rigid_body_solver *s, int stage)
     return rigid_body_NO_CONVERGENCE;
 }
 
-/* The 1 stages of one step. If one fails, the state is as before the step.
-   As a guess from earlier steps may mislead, a stage that fails is tried once more without. */
+/* The 1 stages of one step. If one fails, the state is as before the step. */
 static rigid_body_status rigid_body_stages(rigid_body_solver *s)
 {
     double x[3], carry[3];
@@ -631,6 +630,7 @@ static rigid_body_status rigid_body_stages(rigid_body_solver *s)
     memcpy(carry, s->carry, sizeof carry);
     for (int stage = 0; stage < 1; ++stage) {
         rigid_body_status status = rigid_body_attempt(s, stage);
+        /* A guess from earlier steps may have misled it: once more without. */
         if (status != rigid_body_OK && s->memory[stage].count > 0) {
             memset(&s->memory[stage], 0, sizeof s->memory[stage]);
             status = rigid_body_attempt(s, stage);
@@ -1528,12 +1528,13 @@ static void rigid_body_group_predict(rigid_body_group *group, int stage, rigid_b
     if (group->fitting[stage]) rigid_body_group_foresee(group, stage, y);
     else rigid_body_group_extrapolate(group, stage, y);
     for (int lane = 0; lane < rigid_body_LANES; ++lane) {
-        double distance = 0.0, size = 0.0;
+        double guess[3], state[3];
         for (int i = 0; i < 3; ++i) {
-            distance += fabs(y[i][lane] - group->x[i][lane]);
-            size += fabs(group->x[i][lane]);
+            guess[i] = y[i][lane];
+            state[i] = group->x[i][lane];
         }
-        for (int i = 0; i < 3 && !(distance <= 4.0 * size); ++i) y[i][lane] = group->x[i][lane];
+        const int near = rigid_body_near(guess, state);
+        for (int i = 0; i < 3 && !near; ++i) y[i][lane] = state[i];
     }
 }
 

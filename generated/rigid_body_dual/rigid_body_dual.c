@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 7be1a05e07689d8e34cc8b14ab1178c359395d8ec73be962bf556a197698d6a6
+ * body-sha256: 9e121c05c9f20c6a38a4a82ae31148bc106611b4d7d0e9ad70f04bfe6ce7203d
  */
 #include "rigid_body_dual.h"
 
@@ -508,8 +508,7 @@ static rigid_body_dual_status rigid_body_dual_attempt(rigid_body_dual_solver *s,
     return rigid_body_dual_NO_CONVERGENCE;
 }
 
-/* The 1 stages of one step. If one fails, the state is as before the step.
-   As a guess from earlier steps may mislead, a stage that fails is tried once more without. */
+/* The 1 stages of one step. If one fails, the state is as before the step. */
 static rigid_body_dual_status rigid_body_dual_stages(rigid_body_dual_solver *s)
 {
     double x[3], carry[3];
@@ -517,6 +516,7 @@ static rigid_body_dual_status rigid_body_dual_stages(rigid_body_dual_solver *s)
     memcpy(carry, s->carry, sizeof carry);
     for (int stage = 0; stage < 1; ++stage) {
         rigid_body_dual_status status = rigid_body_dual_attempt(s, stage);
+        /* A guess from earlier steps may have misled it: once more without. */
         if (status != rigid_body_dual_OK && s->memory[stage].count > 0) {
             memset(&s->memory[stage], 0, sizeof s->memory[stage]);
             status = rigid_body_dual_attempt(s, stage);
@@ -1428,12 +1428,13 @@ static void rigid_body_dual_group_predict(rigid_body_dual_group *group, int stag
     if (group->fitting[stage]) rigid_body_dual_group_foresee(group, stage, y);
     else rigid_body_dual_group_extrapolate(group, stage, y);
     for (int lane = 0; lane < rigid_body_dual_LANES; ++lane) {
-        double distance = 0.0, size = 0.0;
+        double guess[3], state[3];
         for (int i = 0; i < 3; ++i) {
-            distance += fabs(y[i][lane] - group->x[i][lane]);
-            size += fabs(group->x[i][lane]);
+            guess[i] = y[i][lane];
+            state[i] = group->x[i][lane];
         }
-        for (int i = 0; i < 3 && !(distance <= 4.0 * size); ++i) y[i][lane] = group->x[i][lane];
+        const int near = rigid_body_dual_near(guess, state);
+        for (int i = 0; i < 3 && !near; ++i) y[i][lane] = state[i];
     }
 }
 

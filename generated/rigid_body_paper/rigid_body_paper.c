@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: f7aebc71563af6d69458471aeffbb2ba5414df37e72c4d3067a728c366c2c8e8
+ * body-sha256: fbf383c9070048895cbf3a444262249595cba79feed9b50ad5c36204e3a94d18
  */
 #include "rigid_body_paper.h"
 
@@ -464,8 +464,7 @@ static rigid_body_paper_status rigid_body_paper_attempt(rigid_body_paper_solver 
     return rigid_body_paper_NO_CONVERGENCE;
 }
 
-/* The 1 stages of one step. If one fails, the state is as before the step.
-   As a guess from earlier steps may mislead, a stage that fails is tried once more without. */
+/* The 1 stages of one step. If one fails, the state is as before the step. */
 static rigid_body_paper_status rigid_body_paper_stages(rigid_body_paper_solver *s)
 {
     double x[3], carry[3];
@@ -473,6 +472,7 @@ static rigid_body_paper_status rigid_body_paper_stages(rigid_body_paper_solver *
     memcpy(carry, s->carry, sizeof carry);
     for (int stage = 0; stage < 1; ++stage) {
         rigid_body_paper_status status = rigid_body_paper_attempt(s, stage);
+        /* A guess from earlier steps may have misled it: once more without. */
         if (status != rigid_body_paper_OK && s->memory[stage].count > 0) {
             memset(&s->memory[stage], 0, sizeof s->memory[stage]);
             status = rigid_body_paper_attempt(s, stage);
@@ -1204,12 +1204,13 @@ static void rigid_body_paper_group_predict(rigid_body_paper_group *group, int st
     if (group->fitting[stage]) rigid_body_paper_group_foresee(group, stage, y);
     else rigid_body_paper_group_extrapolate(group, stage, y);
     for (int lane = 0; lane < rigid_body_paper_LANES; ++lane) {
-        double distance = 0.0, size = 0.0;
+        double guess[3], state[3];
         for (int i = 0; i < 3; ++i) {
-            distance += fabs(y[i][lane] - group->x[i][lane]);
-            size += fabs(group->x[i][lane]);
+            guess[i] = y[i][lane];
+            state[i] = group->x[i][lane];
         }
-        for (int i = 0; i < 3 && !(distance <= 4.0 * size); ++i) y[i][lane] = group->x[i][lane];
+        const int near = rigid_body_paper_near(guess, state);
+        for (int i = 0; i < 3 && !near; ++i) y[i][lane] = state[i];
     }
 }
 

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 7adc39f555b1f571824eb6b33dcb1104dbc8aea0e5fc5d3499b9e255098bf8cf
+ * body-sha256: bf55aa7d8825fbb720b0c8d73062b1da01868803e5dfc85eb19e92219a21f813
  */
 #include "sir_epidemic.h"
 
@@ -438,8 +438,7 @@ static sir_epidemic_status sir_epidemic_attempt(sir_epidemic_solver *s, int stag
     return sir_epidemic_NO_CONVERGENCE;
 }
 
-/* The 1 stages of one step. If one fails, the state is as before the step.
-   As a guess from earlier steps may mislead, a stage that fails is tried once more without. */
+/* The 1 stages of one step. If one fails, the state is as before the step. */
 static sir_epidemic_status sir_epidemic_stages(sir_epidemic_solver *s)
 {
     double x[3], carry[3];
@@ -447,6 +446,7 @@ static sir_epidemic_status sir_epidemic_stages(sir_epidemic_solver *s)
     memcpy(carry, s->carry, sizeof carry);
     for (int stage = 0; stage < 1; ++stage) {
         sir_epidemic_status status = sir_epidemic_attempt(s, stage);
+        /* A guess from earlier steps may have misled it: once more without. */
         if (status != sir_epidemic_OK && s->memory[stage].count > 0) {
             memset(&s->memory[stage], 0, sizeof s->memory[stage]);
             status = sir_epidemic_attempt(s, stage);

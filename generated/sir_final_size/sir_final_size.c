@@ -12,7 +12,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 34fbcfdcdda0a02b5401942399025a4f2cdabb71c97dcda6e579bfbc14ab9e53
+ * body-sha256: b19fd9c6498bcbaef5c35fd80415d75edd18b8d5f510a709e93e6f21940b5ebb
  */
 #include "sir_final_size.h"
 
@@ -440,8 +440,7 @@ static sir_final_size_status sir_final_size_attempt(sir_final_size_solver *s, in
     return sir_final_size_NO_CONVERGENCE;
 }
 
-/* The 1 stages of one step. If one fails, the state is as before the step.
-   As a guess from earlier steps may mislead, a stage that fails is tried once more without. */
+/* The 1 stages of one step. If one fails, the state is as before the step. */
 static sir_final_size_status sir_final_size_stages(sir_final_size_solver *s)
 {
     double x[3], carry[3];
@@ -449,6 +448,7 @@ static sir_final_size_status sir_final_size_stages(sir_final_size_solver *s)
     memcpy(carry, s->carry, sizeof carry);
     for (int stage = 0; stage < 1; ++stage) {
         sir_final_size_status status = sir_final_size_attempt(s, stage);
+        /* A guess from earlier steps may have misled it: once more without. */
         if (status != sir_final_size_OK && s->memory[stage].count > 0) {
             memset(&s->memory[stage], 0, sizeof s->memory[stage]);
             status = sir_final_size_attempt(s, stage);

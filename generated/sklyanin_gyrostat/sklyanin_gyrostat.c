@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 918cf4bf387e5fd1f9675b17235fdae8452fb3712a179b61b46f327a1815a9ec
+ * body-sha256: 20b58537598e6ddc9a9d31d540521faf7a7ee8b0d043e6d088a296e33e593513
  */
 #include "sklyanin_gyrostat.h"
 
@@ -623,8 +623,7 @@ static sklyanin_gyrostat_status sklyanin_gyrostat_attempt(sklyanin_gyrostat_solv
     return sklyanin_gyrostat_NO_CONVERGENCE;
 }
 
-/* The 1 stages of one step. If one fails, the state is as before the step.
-   As a guess from earlier steps may mislead, a stage that fails is tried once more without. */
+/* The 1 stages of one step. If one fails, the state is as before the step. */
 static sklyanin_gyrostat_status sklyanin_gyrostat_stages(sklyanin_gyrostat_solver *s)
 {
     double x[4], carry[4];
@@ -632,6 +631,7 @@ static sklyanin_gyrostat_status sklyanin_gyrostat_stages(sklyanin_gyrostat_solve
     memcpy(carry, s->carry, sizeof carry);
     for (int stage = 0; stage < 1; ++stage) {
         sklyanin_gyrostat_status status = sklyanin_gyrostat_attempt(s, stage);
+        /* A guess from earlier steps may have misled it: once more without. */
         if (status != sklyanin_gyrostat_OK && s->memory[stage].count > 0) {
             memset(&s->memory[stage], 0, sizeof s->memory[stage]);
             status = sklyanin_gyrostat_attempt(s, stage);

@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: c40a0a9193de41c58048029d4daccd4bd5fab531629b499d90b8b20d50ae09e2
+ * body-sha256: f60fe48862f567ab1cabc6641bc9c6dbc37b93a8a409062850fbfb4a22477887
  */
 #include "so4_manakov.h"
 
@@ -929,8 +929,7 @@ static so4_manakov_status so4_manakov_attempt(so4_manakov_solver *s, int stage)
     return so4_manakov_NO_CONVERGENCE;
 }
 
-/* The 1 stages of one step. If one fails, the state is as before the step.
-   As a guess from earlier steps may mislead, a stage that fails is tried once more without. */
+/* The 1 stages of one step. If one fails, the state is as before the step. */
 static so4_manakov_status so4_manakov_stages(so4_manakov_solver *s)
 {
     double x[6], carry[6];
@@ -938,6 +937,7 @@ static so4_manakov_status so4_manakov_stages(so4_manakov_solver *s)
     memcpy(carry, s->carry, sizeof carry);
     for (int stage = 0; stage < 1; ++stage) {
         so4_manakov_status status = so4_manakov_attempt(s, stage);
+        /* A guess from earlier steps may have misled it: once more without. */
         if (status != so4_manakov_OK && s->memory[stage].count > 0) {
             memset(&s->memory[stage], 0, sizeof s->memory[stage]);
             status = so4_manakov_attempt(s, stage);
@@ -2333,12 +2333,13 @@ static void so4_manakov_group_predict(so4_manakov_group *group, int stage, so4_m
     if (group->fitting[stage]) so4_manakov_group_foresee(group, stage, y);
     else so4_manakov_group_extrapolate(group, stage, y);
     for (int lane = 0; lane < so4_manakov_LANES; ++lane) {
-        double distance = 0.0, size = 0.0;
+        double guess[6], state[6];
         for (int i = 0; i < 6; ++i) {
-            distance += fabs(y[i][lane] - group->x[i][lane]);
-            size += fabs(group->x[i][lane]);
+            guess[i] = y[i][lane];
+            state[i] = group->x[i][lane];
         }
-        for (int i = 0; i < 6 && !(distance <= 4.0 * size); ++i) y[i][lane] = group->x[i][lane];
+        const int near = so4_manakov_near(guess, state);
+        for (int i = 0; i < 6 && !near; ++i) y[i][lane] = state[i];
     }
 }
 

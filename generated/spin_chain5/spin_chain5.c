@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 9af16312f87ad825c3b355ff1c58f0878ca3e4ecc24bfac8b3b431c26c1cb834
+ * body-sha256: 0c06c8e6bc1f2c0d81e6d26ea0f0b8cc84f8c626722da19608491d42e8d295c7
  */
 #include "spin_chain5.h"
 
@@ -1907,8 +1907,7 @@ static spin_chain5_status spin_chain5_attempt(spin_chain5_solver *s, int stage)
     return spin_chain5_NO_CONVERGENCE;
 }
 
-/* The 1 stages of one step. If one fails, the state is as before the step.
-   As a guess from earlier steps may mislead, a stage that fails is tried once more without. */
+/* The 1 stages of one step. If one fails, the state is as before the step. */
 static spin_chain5_status spin_chain5_stages(spin_chain5_solver *s)
 {
     double x[15], carry[15];
@@ -1916,6 +1915,7 @@ static spin_chain5_status spin_chain5_stages(spin_chain5_solver *s)
     memcpy(carry, s->carry, sizeof carry);
     for (int stage = 0; stage < 1; ++stage) {
         spin_chain5_status status = spin_chain5_attempt(s, stage);
+        /* A guess from earlier steps may have misled it: once more without. */
         if (status != spin_chain5_OK && s->memory[stage].count > 0) {
             memset(&s->memory[stage], 0, sizeof s->memory[stage]);
             status = spin_chain5_attempt(s, stage);
@@ -4953,12 +4953,13 @@ static void spin_chain5_group_predict(spin_chain5_group *group, int stage, spin_
     if (group->fitting[stage]) spin_chain5_group_foresee(group, stage, y);
     else spin_chain5_group_extrapolate(group, stage, y);
     for (int lane = 0; lane < spin_chain5_LANES; ++lane) {
-        double distance = 0.0, size = 0.0;
+        double guess[15], state[15];
         for (int i = 0; i < 15; ++i) {
-            distance += fabs(y[i][lane] - group->x[i][lane]);
-            size += fabs(group->x[i][lane]);
+            guess[i] = y[i][lane];
+            state[i] = group->x[i][lane];
         }
-        for (int i = 0; i < 15 && !(distance <= 4.0 * size); ++i) y[i][lane] = group->x[i][lane];
+        const int near = spin_chain5_near(guess, state);
+        for (int i = 0; i < 15 && !near; ++i) y[i][lane] = state[i];
     }
 }
 

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 81a28d0f728212c6d39f5e1c34d8421240d4f5710f0c8f6ebbd708a94364c449
+ * body-sha256: b2a2d98134517c4b1ba7c80be4983fa8f85296b4774d0fa295b73bd2fd7fc0e1
  */
 #include "toda3.h"
 
@@ -539,8 +539,7 @@ static toda3_status toda3_attempt(toda3_solver *s, int stage)
     return toda3_NO_CONVERGENCE;
 }
 
-/* The 1 stages of one step. If one fails, the state is as before the step.
-   As a guess from earlier steps may mislead, a stage that fails is tried once more without. */
+/* The 1 stages of one step. If one fails, the state is as before the step. */
 static toda3_status toda3_stages(toda3_solver *s)
 {
     double x[5], carry[5];
@@ -548,6 +547,7 @@ static toda3_status toda3_stages(toda3_solver *s)
     memcpy(carry, s->carry, sizeof carry);
     for (int stage = 0; stage < 1; ++stage) {
         toda3_status status = toda3_attempt(s, stage);
+        /* A guess from earlier steps may have misled it: once more without. */
         if (status != toda3_OK && s->memory[stage].count > 0) {
             memset(&s->memory[stage], 0, sizeof s->memory[stage]);
             status = toda3_attempt(s, stage);
@@ -1383,12 +1383,13 @@ static void toda3_group_predict(toda3_group *group, int stage, toda3_lanes y[5])
     if (group->fitting[stage]) toda3_group_foresee(group, stage, y);
     else toda3_group_extrapolate(group, stage, y);
     for (int lane = 0; lane < toda3_LANES; ++lane) {
-        double distance = 0.0, size = 0.0;
+        double guess[5], state[5];
         for (int i = 0; i < 5; ++i) {
-            distance += fabs(y[i][lane] - group->x[i][lane]);
-            size += fabs(group->x[i][lane]);
+            guess[i] = y[i][lane];
+            state[i] = group->x[i][lane];
         }
-        for (int i = 0; i < 5 && !(distance <= 4.0 * size); ++i) y[i][lane] = group->x[i][lane];
+        const int near = toda3_near(guess, state);
+        for (int i = 0; i < 5 && !near; ++i) y[i][lane] = state[i];
     }
 }
 

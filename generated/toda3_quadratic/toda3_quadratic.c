@@ -12,7 +12,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 0fd52d537b92137bc3f07b99d81de27c358a7ccd574311fd6e15d3eed4bb1340
+ * body-sha256: 16f87bbd1c22189a03102fd04afad808a60a9ddd72391d961a114ca126496bcb
  */
 #include "toda3_quadratic.h"
 
@@ -503,8 +503,7 @@ static toda3_quadratic_status toda3_quadratic_attempt(toda3_quadratic_solver *s,
     return toda3_quadratic_NO_CONVERGENCE;
 }
 
-/* The 1 stages of one step. If one fails, the state is as before the step.
-   As a guess from earlier steps may mislead, a stage that fails is tried once more without. */
+/* The 1 stages of one step. If one fails, the state is as before the step. */
 static toda3_quadratic_status toda3_quadratic_stages(toda3_quadratic_solver *s)
 {
     double x[5], carry[5];
@@ -512,6 +511,7 @@ static toda3_quadratic_status toda3_quadratic_stages(toda3_quadratic_solver *s)
     memcpy(carry, s->carry, sizeof carry);
     for (int stage = 0; stage < 1; ++stage) {
         toda3_quadratic_status status = toda3_quadratic_attempt(s, stage);
+        /* A guess from earlier steps may have misled it: once more without. */
         if (status != toda3_quadratic_OK && s->memory[stage].count > 0) {
             memset(&s->memory[stage], 0, sizeof s->memory[stage]);
             status = toda3_quadratic_attempt(s, stage);

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: f67de47d215ccaa1e67c0720564994322ca0a55449c4bdd86dd358dc757a3683
+ * body-sha256: b69dc4d1be08c44d44c123047f48a16056a20d193138fbe5e9b95c89f2bf3be9
  */
 #include "volterra5.h"
 
@@ -449,8 +449,7 @@ static volterra5_status volterra5_attempt(volterra5_solver *s, int stage)
     return volterra5_NO_CONVERGENCE;
 }
 
-/* The 1 stages of one step. If one fails, the state is as before the step.
-   As a guess from earlier steps may mislead, a stage that fails is tried once more without. */
+/* The 1 stages of one step. If one fails, the state is as before the step. */
 static volterra5_status volterra5_stages(volterra5_solver *s)
 {
     double x[5], carry[5];
@@ -458,6 +457,7 @@ static volterra5_status volterra5_stages(volterra5_solver *s)
     memcpy(carry, s->carry, sizeof carry);
     for (int stage = 0; stage < 1; ++stage) {
         volterra5_status status = volterra5_attempt(s, stage);
+        /* A guess from earlier steps may have misled it: once more without. */
         if (status != volterra5_OK && s->memory[stage].count > 0) {
             memset(&s->memory[stage], 0, sizeof s->memory[stage]);
             status = volterra5_attempt(s, stage);
@@ -1291,12 +1291,13 @@ static void volterra5_group_predict(volterra5_group *group, int stage, volterra5
     if (group->fitting[stage]) volterra5_group_foresee(group, stage, y);
     else volterra5_group_extrapolate(group, stage, y);
     for (int lane = 0; lane < volterra5_LANES; ++lane) {
-        double distance = 0.0, size = 0.0;
+        double guess[5], state[5];
         for (int i = 0; i < 5; ++i) {
-            distance += fabs(y[i][lane] - group->x[i][lane]);
-            size += fabs(group->x[i][lane]);
+            guess[i] = y[i][lane];
+            state[i] = group->x[i][lane];
         }
-        for (int i = 0; i < 5 && !(distance <= 4.0 * size); ++i) y[i][lane] = group->x[i][lane];
+        const int near = volterra5_near(guess, state);
+        for (int i = 0; i < 5 && !near; ++i) y[i][lane] = state[i];
     }
 }
 

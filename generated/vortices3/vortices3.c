@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 25258e9f6ecb03ced90cdf5775ba58e9612e295ebf19679abf46f049b2f6757d
+ * body-sha256: 2c5dc16c592c47dd78383944c747ff54b6486079fafd870eef740c836f675dd0
  */
 #include "vortices3.h"
 
@@ -957,8 +957,7 @@ static vortices3_status vortices3_attempt(vortices3_solver *s, int stage)
     return vortices3_NO_CONVERGENCE;
 }
 
-/* The 1 stages of one step. If one fails, the state is as before the step.
-   As a guess from earlier steps may mislead, a stage that fails is tried once more without. */
+/* The 1 stages of one step. If one fails, the state is as before the step. */
 static vortices3_status vortices3_stages(vortices3_solver *s)
 {
     double x[6], carry[6];
@@ -966,6 +965,7 @@ static vortices3_status vortices3_stages(vortices3_solver *s)
     memcpy(carry, s->carry, sizeof carry);
     for (int stage = 0; stage < 1; ++stage) {
         vortices3_status status = vortices3_attempt(s, stage);
+        /* A guess from earlier steps may have misled it: once more without. */
         if (status != vortices3_OK && s->memory[stage].count > 0) {
             memset(&s->memory[stage], 0, sizeof s->memory[stage]);
             status = vortices3_attempt(s, stage);
@@ -2343,12 +2343,13 @@ static void vortices3_group_predict(vortices3_group *group, int stage, vortices3
     if (group->fitting[stage]) vortices3_group_foresee(group, stage, y);
     else vortices3_group_extrapolate(group, stage, y);
     for (int lane = 0; lane < vortices3_LANES; ++lane) {
-        double distance = 0.0, size = 0.0;
+        double guess[6], state[6];
         for (int i = 0; i < 6; ++i) {
-            distance += fabs(y[i][lane] - group->x[i][lane]);
-            size += fabs(group->x[i][lane]);
+            guess[i] = y[i][lane];
+            state[i] = group->x[i][lane];
         }
-        for (int i = 0; i < 6 && !(distance <= 4.0 * size); ++i) y[i][lane] = group->x[i][lane];
+        const int near = vortices3_near(guess, state);
+        for (int i = 0; i < 6 && !near; ++i) y[i][lane] = state[i];
     }
 }
 

@@ -31,10 +31,22 @@ def test_vectorised_blocks_and_groups_equal_single_steps(name, tmp_path):
 
 @pytest.mark.parametrize("name", ["rigid_body", "volterra5"])
 def test_blocks_of_several_stages_equal_single_steps(name, tmp_path):
-    composed = replace(compiled(name).spec, composition="kahan-li")
-    compilation = compile_spec(composed, order=6)
-    assert len(compilation.program.fractions) > 3
+    composed = replace(compiled(name).spec, composition="suzuki")
+    compilation = compile_spec(composed, order=4)
+    assert len(compilation.program.fractions) == 5
     exercise(compilation, "-O2", tmp_path)
+
+
+def test_members_go_one_by_one_where_a_group_would_take_too_much_stack():
+    """Seventeen stages: blocks are small enough, groups with the past values of eight members are not."""
+    composed = replace(compiled("rigid_body").spec, composition="kahan-li")
+    compilation = compile_spec(composed, order=8)
+    code = emit(compilation.program, "c", COMMAND, single_file=True)["rigid_body.c"]
+    assert "rigid_body_block(" in code
+    assert "rigid_body_group" not in code
+    many = solver(compilation, "c").ensemble([[0.1, 1.0, 0.1], [1.0, 0.2, 0.3], [0.5, 0.5, 0.5]], 0.1, 50)
+    alone = solver(compilation, "c").integrate([0.1, 1.0, 0.1], 0.1, 50, stride=50).x[-1]
+    np.testing.assert_allclose(many[0], alone, rtol=0, atol=1e-15)
 
 
 def exercise(compilation, optimisation, folder):

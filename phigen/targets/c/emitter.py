@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 from phigen.scheme.program import Program
 from phigen.targets import special
@@ -90,12 +91,12 @@ def _values(program: Program) -> dict[str, object]:
         "tolerance": repr(program.tolerance),
         **{f"{key}_signature": "\n".join(lines) for key, lines in _signatures(program).items()},
         "apart": apart(program),
-        **lanes.values(program),
+        **lanes.values(program, _memory_values(program)),
         "pivoting": f"{program.name}_solve" + ("_pivoting" if "eliminate" in program.kernels else ""),
     }
 
 
-def _memory_values(program: Program) -> dict[str, object]:
+def _memory_values(program: Program) -> dict[str, Any]:
     affordable = MOST_HISTORY // (2 * program.dimension * len(program.fractions))
     fitted = max(SMALLEST, min(FITTED, affordable))
     ahead = LANES if lanes.blocks(program) else 1
@@ -115,8 +116,8 @@ def _memory_lines(program: Program) -> dict[str, object]:
     """The memory of the inner solve, where there is one."""
     name, stages = program.name, len(program.fractions)
     if program.driver in ("explicit", "splitting"):
-        nothing = dict.fromkeys(("memory_type", "memory_members", "memory_reset", "retry"), ())
-        return {**nothing, "retry_said": "", "attempted": f"const {name}_status status", "remembered_value": "at.x"}
+        nothing: dict[str, object] = dict.fromkeys(("memory_type", "memory_members", "memory_reset", "retry"), ())
+        return nothing | {"remembered_value": "at.x"}
     head = {"NAME": name, **_memory_values(program)}
     return {
         "memory_type": [*render("c", "memory.h", head).splitlines(), ""],
@@ -126,14 +127,13 @@ def _memory_lines(program: Program) -> dict[str, object]:
             f"for (int stage = 0; stage < {stages}; ++stage) s->memory[stage].patience = {REPAY};",
         ],
         "retry": [
+            "/* A guess from earlier steps may have misled it: once more without. */",
             f"if (status != {name}_OK && s->memory[stage].count > 0) {{",
             "    memset(&s->memory[stage], 0, sizeof s->memory[stage]);",
             f"    status = {name}_attempt(s, stage);",
             "}",
         ],
-        "retry_said": "\n   As a guess from earlier steps may mislead, a stage that fails is tried once more without.",
         "remembered_value": "s->memory[k].past[s->memory[k].count - 1]",
-        "attempted": f"{name}_status status",
     }
 
 

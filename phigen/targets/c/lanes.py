@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Set
 from dataclasses import replace
+from typing import Any
 
 from phigen.scheme.program import Kernel, Program
 from phigen.symbolic.expression import topological
@@ -12,7 +13,7 @@ from phigen.symbolic.special import LANE_REACH, SPECIAL, lane_coefficients, orde
 from phigen.targets.c.kernels import FUNCTIONS, LANE_FORMULAS, LANE_FUNCTIONS, LANES, each_lane, function
 from phigen.targets.rendering import render
 
-#: Bytes that the working arrays of a block may take on the stack.
+#: Bytes that the working arrays of a block, or of a group of members, may take on the stack.
 MOST_STACK = 256 * 1024
 
 #: Passes over a block that cost, per step, what an evaluation at one point costs: with loops that are vectorised, and
@@ -24,6 +25,11 @@ FROZEN = 1e-5
 
 #: Functions that are instructions, or arithmetic.
 _INLINE = {"abs", "sqrt", "sign", "inv"}
+
+#: Templates in the order in which they call one another.
+_BLOCKS = ("sizes", "correct", "near_lanes", "solved", "chain", "block", "march", "block_step", "choose_guess")
+_BLOCKS += ("integrate_blocks",)
+_GROUPS = ("group", "group_guess", "group_fit", "group_solve", "group_step", "group_run", "ensemble")
 
 _MEMBERS = [
     "double effort;  /* evaluations that a single step takes, for each stage */",
@@ -71,8 +77,16 @@ def vectorised(program: Program) -> bool:
     return not calls & {e.op for e in topological(program.kernels["linearise"].roots)}
 
 
-def values(program: Program) -> Mapping[str, object]:
-    """What the templates of this room read."""
+def groups(program: Program, rows: int) -> bool:
+    """Whether ensembles are integrated in groups, each with so many rows of values and weights on the stack."""
+    n = program.dimension
+    values = len(program.fractions) * (program.coefficients + rows * n) + 7 * n + 3 * n * n
+    return blocks(program) and 8 * LANES * values <= MOST_STACK
+
+
+def values(program: Program, memory: Mapping[str, int]) -> Mapping[str, object]:
+    """What the templates of this room read; ``memory`` says how many values are remembered."""
+    grouped = groups(program, memory["fitted"] + memory["window"])
     return {
         "lanes": LANES,
         "each_lane": each_lane(program),
@@ -80,15 +94,16 @@ def values(program: Program) -> Mapping[str, object]:
         "frozen": repr(FROZEN),
         "passes": PASSES if vectorised(program) else PASSES_OF_CALLS,
         "ensemble_how": f"{LANES} are integrated\n   side by side, and with OpenMP such groups in parallel."
-        if blocks(program)
+        if grouped
         else "Each is integrated by itself.",
+        "ensemble_templates": _GROUPS if grouped else ("ensemble_members",),
         "block_members": _MEMBERS if blocks(program) else [],
-        **_members(program),
+        **_group_values(program),
         "block_reset": _RESET if blocks(program) else [],
     }
 
 
-def _members(program: Program) -> Mapping[str, object]:
+def _group_values(program: Program) -> Mapping[str, object]:
     """What is particular to each member of an ensemble: the gauge, where it is chosen at the start."""
     gauges = len(program.gauge)
     if not gauges:
@@ -100,10 +115,11 @@ def _members(program: Program) -> Mapping[str, object]:
     }
 
 
-def pieces(program: Program, values: Mapping[str, object]) -> list[str]:
+def pieces(program: Program, values: Mapping[str, Any]) -> list[str]:
     """`integrate` and `ensemble`, with what they need."""
+    ensemble: tuple[str, ...] = values["ensemble_templates"]
     if not blocks(program):
-        return [render("c", "integrate.c", values), render("c", "ensemble_members.c", values)]
+        return [render("c", f"{template}.c", values) for template in ("integrate", *ensemble)]
     kernel = program.kernels["linearise"]
     found = [render("c", "lanes.c", values), *lane_functions(program, {e.op for e in topological(kernel.roots)})]
     found.append(function(program, kernel, lanes=True) + "\n")
@@ -113,19 +129,7 @@ def pieces(program: Program, values: Mapping[str, object]) -> list[str]:
         found.append(render("c", "tabulate_unrolled.c", values))
     else:
         found.append(render("c", "tabulate.c", values))
-    templates = [
-        "sizes",
-        "correct",
-        "near_lanes",
-        "solved",
-        "chain",
-        "block",
-        "march",
-        "block_step",
-        "choose_guess",
-        "integrate_blocks",
-    ]
-    templates += ["group", "group_guess", "group_fit", "group_solve", "group_step", "group_run", "ensemble"]
+    templates = (*_BLOCKS, *ensemble, "lanes_end")
     return found + [render("c", f"{template}.c", values) for template in templates]
 
 
