@@ -16,6 +16,7 @@ from phigen.report.material import Material
 if TYPE_CHECKING:
     from phigen.analysis.proof import Examination
     from phigen.analysis.verification import Verification
+    from phigen.cli.recording import Recorder
     from phigen.compiler import Compilation
     from phigen.runtime.solver import Solver
     from phigen.runtime.trajectory import Trajectory
@@ -57,16 +58,13 @@ def _integrated(
     material: Material, experiment: Experiment, lyapunov: bool, console: Console
 ) -> tuple[Material, list[PhigenError]]:
     """With the trajectories of the solver and of the methods that the run compares with."""
-    from phigen.cli.recording import Files, Recorder, compared, record
+    from phigen.cli.recording import Files, Recorder, compared
 
     compilation, run = material.compilation, experiment.run
     solver = loaded(compilation, "auto", console)
     console.note(f"{compilation.spec.name}: run {run.name}, {run.steps} steps")
     recorder = Recorder(compilation, solver, experiment, Files(), lyapunov)
-    recorder.start()
-    failure, interrupted = record(recorder, console)
-    if interrupted:
-        raise InterruptedRunError("interrupted: no page was written")
+    failure = _recorded(recorder, console)
     methods, summaries = {recorder.label: recorder.trajectory(failure is not None)}, [recorder.watch.summary()]
     for method in (run.compare or COMPARED) if failure is None else ():
         watch, methods[method] = compared(compilation, solver, experiment, method, console)
@@ -85,21 +83,31 @@ def _integrated(
     return made, [failure] if failure else []
 
 
+def _recorded(recorder: Recorder, console: Console) -> StepError | None:
+    """Make the run; the failure that ended it, if one did."""
+    from phigen.cli.recording import record
+
+    recorder.start()
+    failure, interrupted = record(recorder, console)
+    if interrupted:
+        raise InterruptedRunError("interrupted: no page was written")
+    return failure
+
+
 def _opening(
     compilation: Compilation, solver: Solver, experiment: Experiment, others: Sequence[str], console: Console
 ) -> dict[str, Trajectory]:
     """Every one of the first steps, by the solver and by other methods; nothing if the run has no more."""
-    from phigen.cli.recording import Files, Recorder, compared, record
+    from phigen.cli.recording import Files, Recorder, compared
 
     run = experiment.run
     if run.stride == 1 and run.steps <= _OPENING:
         return {}
     first = replace(experiment, run=replace(run, steps=min(run.steps, _OPENING), stride=1, section=None))
     recorder = Recorder(compilation, solver, first, Files(), lyapunov=False)
-    recorder.start()
-    record(recorder, console)
+    failure = _recorded(recorder, console)
     beside = {method: compared(compilation, solver, first, method, console)[1] for method in others}
-    return {recorder.label: recorder.trajectory(False), **beside}
+    return {recorder.label: recorder.trajectory(failure is not None), **beside}
 
 
 def _with_constancy(material: Material, experiment: Experiment) -> Material:

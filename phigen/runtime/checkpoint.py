@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -45,7 +46,7 @@ def load(path: Path, identity: Mapping[str, Any]) -> Mapping[str, Any]:
         with np.load(path, allow_pickle=False) as stored:
             arrays = {name: stored[name] for name in stored.files}
         found = json.loads(arrays.pop(_IDENTITY).tobytes())
-    except (ValueError, KeyError, EOFError) as error:
+    except (ValueError, KeyError, EOFError, TypeError, zipfile.BadZipFile) as error:
         raise MismatchError(f"{path} is not a checkpoint of phigen: {error}") from None
     # What is compared went through JSON as well: tuples are lists.
     wanted = json.loads(json.dumps(identity))

@@ -47,7 +47,6 @@ def test_exponents_of_an_integrable_system_fall_like_log_t_over_t():
     found = spectrum(solver(compiled("rigid_body").spec), [0.45, 0.0, 0.89], 0.05, 8000)
     bound = 3 * np.log(found.times) / found.times
     assert np.all(np.abs(found.history[found.times > 20]) < bound[found.times > 20, None])
-    assert found.largest < 0.05
     assert found.uncertainty < 0.05
 
 
@@ -66,7 +65,7 @@ def test_directions_across_the_leaves_add_zeros(target):
     """Two Casimirs of the top: their differentials are carried along unchanged, so two exponents vanish like 1/t."""
     found = spectrum(solver(compiled("lagrange_top").spec, target), [0.2, -0.1, 3.0, 0.6, 0.0, 0.8], 0.05, 400)
     middle = np.sort(np.abs(found.exponents))[:2]
-    assert np.all(middle < 20 / found.t)
+    assert np.all(middle < 0.3 / found.t)
     assert abs(found.total) < 1e-12  # se(3) is unimodular: volume is conserved
 
 

@@ -27,8 +27,8 @@ FROZEN = 1e-5
 _INLINE = {"abs", "sqrt", "sign", "inv"}
 
 #: Templates in the order in which they call one another.
-_BLOCKS = ("sizes", "correct", "near_lanes", "solved", "chain", "block", "march", "block_step", "choose_guess")
-_BLOCKS += ("integrate_blocks",)
+_MODELS = ("sizes", "correct", "near_lanes", "solved")
+_BLOCKS = (*_MODELS, "chain", "block", "march", "block_step", "choose_guess", "integrate_blocks")
 _GROUPS = ("group", "group_guess", "group_fit", "group_solve", "group_step", "group_run", "ensemble")
 
 _MEMBERS = [
