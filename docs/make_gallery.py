@@ -62,7 +62,7 @@ def facts(name: str) -> dict[str, Any]:
     found = source(name)
     compilation = compilation_of(found)
     solver, run = solver_of(compilation), longest_run(found)
-    parameters = {p.name: float(run.parameters.get(p.name, p.value)) for p in found.parameters}
+    parameters = found.parameters_of(run)
     x0, h = np.array([float(v) for v in run.initial]), float(run.step)
     own = solver.integrate(x0, h, run.steps, run.stride, parameters=parameters)
     summaries = [summarise("phigen", compilation.system, run, parameters, own.t, own.x)]
@@ -96,7 +96,7 @@ def draw(name: str) -> None:
     found = source(name)
     compilation = compilation_of(found)
     solver, run = solver_of(compilation), longest_run(found)
-    parameters = {p.name: float(run.parameters.get(p.name, p.value)) for p in found.parameters}
+    parameters = found.parameters_of(run)
     # Many panels would make a large file: fewer steps there, and of very many no leaves.
     steps = min(run.steps, DRAWN if found.dimension <= 4 else DRAWN // 2)
     casimirs = compilation.system.casimirs if found.dimension <= 9 else {}
@@ -111,7 +111,7 @@ def _sections(found: Spec, solver: Solver) -> dict[str, Any]:
     sections = {}
     for run in found.runs.values():
         if run.section is not None and found.dimension > 3:
-            parameters = {p.name: float(run.parameters.get(p.name, p.value)) for p in found.parameters}
+            parameters = found.parameters_of(run)
             g = function_of(run.section, solver.coordinates, parameters)
             points = solver.section(run.initial, float(run.step), run.steps, g, parameters=parameters).x
             sections[f"{run.name}: {readable_one(run.section, None)} = 0"] = points[:CROSSINGS]

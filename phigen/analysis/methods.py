@@ -41,12 +41,20 @@ def of_solver(solver: Solver, parameters: Mapping[str, float], gauge: Floats | N
     )
 
 
-def of_classical(name: str, solver: Solver, parameters: Mapping[str, float]) -> Method:
-    """A classical method on the vector field of a solver."""
+def field_of(solver: Solver, parameters: Mapping[str, float]) -> Callable[[Floats], Floats]:
+    """The vector field of a solver at one state (DIM,), without the checks that the public method makes each time."""
 
     def field(x: Floats) -> Floats:
         slope: Floats = solver.backend.vector_field(x[None, :], parameters)[0]
         return slope
+
+    return field
+
+
+def of_classical(name: str, solver: Solver, parameters: Mapping[str, float]) -> Method:
+    """A classical method on the vector field of a solver."""
+
+    field = field_of(solver, parameters)
 
     def rows(x: Floats, h: float, steps: int, stride: int) -> Floats:
         found = classical.integrate(name, field, x, h, steps, stride)

@@ -46,6 +46,10 @@ class Curve:
     points: tuple[Point, ...]
     slope: float
 
+    def seconds_for(self, tolerance: float) -> float:
+        """The least time of a point with no larger error; NaN if there is none."""
+        return min((p.seconds for p in self.points if p.error <= tolerance), default=math.nan)
+
 
 @dataclass(frozen=True)
 class Study:

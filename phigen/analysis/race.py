@@ -14,6 +14,7 @@ import numpy as np
 
 from phigen.analysis import classical, dop853
 from phigen.analysis.arrays import Floats
+from phigen.analysis.methods import field_of
 from phigen.compiler import Compilation, emit
 from phigen.errors import StepError
 from phigen.runtime import cache
@@ -93,9 +94,7 @@ def interpreted(solver: Solver, methods: Sequence[str], start: Floats, parameter
             return None
         return found
 
-    def field(x: Floats) -> Floats:
-        slope: Floats = solver.backend.vector_field(x[None, :], parameters)[0]
-        return slope
+    field = field_of(solver, parameters)
 
     def runner(method: str) -> Runner:
         def run(h: float, steps: int, repeats: int) -> Floats | None:

@@ -143,14 +143,6 @@ class Watch:
         )
 
 
-def drift(values: Floats, scale: float = 1.0) -> Drift:
-    """The drift of the values of one quantity along a trajectory."""
-    errors, _ = errors_of(values, scale)
-    maxima = np.full(WINDOWS + 1, _NOTHING)
-    np.maximum.at(maxima, _windows(np.arange(len(values)), len(values)), errors)
-    return _drift(maxima, float(values[0]), scale, len(values))
-
-
 def _windows(rows: NDArray[np.int64], of: int) -> NDArray[np.int64]:
     """The window of each row but the first, which has one of its own: `WINDOWS` parts of a run of so many rows."""
     ends = np.cumsum([len(part) for part in np.array_split(np.arange(1, of), WINDOWS)])

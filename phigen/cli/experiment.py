@@ -56,7 +56,7 @@ def prepared(
     if steps is not None:
         run = replace(run, steps=steps, stride=min(run.stride, steps))
     initial = dict(zip(spec.coordinates, map(float, run.initial), strict=True))
-    parameters = {p.name: float(run.parameters.get(p.name, p.value)) for p in spec.parameters}
+    parameters = spec.parameters_of(run)
     for setting in settings:
         _set(setting, initial, parameters)
     for p in spec.parameters:

@@ -13,7 +13,7 @@ import numpy as np
 
 from phigen._version import __version__
 from phigen.analysis.formulas import readable
-from phigen.analysis.lyapunov import FrameGrowth
+from phigen.analysis.lyapunov import FrameGrowth, Spectrum
 from phigen.analysis.sections import function_of
 from phigen.analysis.sketch import POINTS, Sketch, Thinned
 from phigen.analysis.summary import Watch
@@ -25,7 +25,7 @@ from phigen.errors import StepError
 from phigen.runtime import checkpoint
 from phigen.runtime.checkpoint import Checkpoint, MismatchError
 from phigen.runtime.crossings import CrossingFinder, section_columns
-from phigen.runtime.interface import BackendError, Floats
+from phigen.runtime.interface import BackendError
 from phigen.runtime.march import Piece, march
 from phigen.runtime.session import Session
 from phigen.runtime.solver import Solver
@@ -93,6 +93,11 @@ class Recorder:
         """The expression of the section, for people."""
         section = self.experiment.run.section
         return readable([section])[0] if section is not None else ""
+
+    @property
+    def spectrum(self) -> Spectrum | None:
+        """The Lyapunov exponents so far, if they were asked for and a step was made."""
+        return self.growth.spectrum() if self.growth and self.session.steps else None
 
     def start(self) -> None:
         """Stand at the initial state, with new files."""
@@ -241,19 +246,18 @@ def compared(
 ) -> tuple[Watch, Trajectory]:
     """A classical method on the same experiment: its errors, and its trajectory as far as a figure can show it."""
     from phigen.analysis import classical
+    from phigen.analysis.methods import field_of
 
     run, parameters, names = experiment.run, experiment.parameters, solver.interface
     start, backend = time.perf_counter(), solver.backend
     watch = Watch(method, compilation.system, run, parameters, experiment.rows)
     sketch = Sketch(names.dimension, len(names.casimirs), experiment.rows)
 
-    def field(x: Floats) -> Floats:
-        slope: Floats = backend.vector_field(x[None, :], parameters)[0]
-        return slope
-
     with console.progress(method, run.steps) as progress:
         x0 = np.array(experiment.initial)
-        for numbers, x in classical.pieces_of(method, field, x0, experiment.h, run.steps, run.stride):
+        for numbers, x in classical.pieces_of(
+            method, field_of(solver, parameters), x0, experiment.h, run.steps, run.stride
+        ):
             t = experiment.h * numbers.astype(np.float64)
             watch.see(t, x)
             energy, casimirs = backend.hamiltonian(x, parameters), backend.casimirs(x, parameters)

@@ -77,7 +77,7 @@ def _integrated(
         methods=methods,
         summaries=tuple(summaries),
         section=(recorder.section_text, recorder.points.rows[:, 1:], recorder.points.seen) if recorder.finder else None,
-        spectrum=recorder.growth.spectrum() if recorder.growth and recorder.session.steps else None,
+        spectrum=recorder.spectrum,
         notes=(f"The run could not be completed: {failure}.",) if failure else (),
     )
     return made, [failure] if failure else []

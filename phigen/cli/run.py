@@ -111,6 +111,5 @@ def _draw(path: Path, recorder: Recorder, drawn: dict[str, Trajectory], casimirs
     from phigen.analysis import figures
 
     sections = {f"{recorder.section_text} = 0": recorder.points.rows[:, 1:]} if recorder.finder else {}
-    spectrum = recorder.growth.spectrum() if recorder.growth and recorder.session.steps else None
     title = f"{recorder.solver.interface.name}, {recorder.experiment.run.name}"
-    figures.save(figures.run_figure(drawn, casimirs, sections, title, spectrum), path)
+    figures.save(figures.run_figure(drawn, casimirs, sections, title, recorder.spectrum), path)

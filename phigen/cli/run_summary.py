@@ -29,8 +29,7 @@ def print_summary(compilation: Compilation, recorder: Recorder, summaries: Seque
     if recorder.finder:
         count = counted(recorder.points.seen, "rising crossing")
         out(f"\n  {count} of the section {recorder.section_text} = 0")
-    if recorder.growth and steps:
-        spectrum = recorder.growth.spectrum()
+    if spectrum := recorder.spectrum:
         changed = f"the second half changed them by {spectrum.uncertainty:.1g}"
         out(f"\n  Lyapunov exponents after t = {spectrum.t:.9g}; {changed}")
         out(f"  {', '.join(f'{value:.4g}' for value in spectrum.exponents.tolist())};  sum {spectrum.total:.1g}")
@@ -80,8 +79,8 @@ def described_run(compilation: Compilation, recorder: Recorder, summaries: Seque
     }
     if recorder.finder:
         told["section"] = {"expression": recorder.section_text, "crossings": recorder.points.seen}
-    if recorder.growth and session.steps:
-        told["lyapunov"] = _described_spectrum(recorder.growth.spectrum())
+    if spectrum := recorder.spectrum:
+        told["lyapunov"] = _described_spectrum(spectrum)
     return told
 
 

@@ -1,4 +1,4 @@
-"""Everything that a page is made of; gathering it takes the time, see `phigen.cli.report`."""
+"""Everything that a page is made of; gathering it takes the time, see `phigen.cli.report_material`."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ from phigen.spec.model import Run
 class Material:
     """What was proved, and what was measured on one run; what could not be had is None, and ``notes`` say why.
 
-    ``methods`` are trajectories by their labels, the solver's first, ``opening`` every step of the first ones
-    if the run is longer. ``section`` is what its Poincaré section is the
-    zero of, some of its points (rows, DIM), and how many there are; ``spectrum`` are its Lyapunov exponents.
+    ``methods`` are trajectories by their labels, the solver's first; ``opening`` has each of the first steps, where
+    ``methods`` do not have all. ``section`` is what its Poincaré section is the zero of, some of its points
+    (rows, DIM), and how many there are; ``spectrum`` are its Lyapunov exponents.
     ``constancy`` is that of the modified Hamiltonian; ``no_constancy`` says why there is none.
     ``environment`` says what the times depend on. ``command`` makes the page again.
     """

@@ -110,10 +110,7 @@ def _described(s: Summary) -> str:
 
 
 def _fastest(study: Study, tolerance: float) -> str:
-    found = {}
-    for curve in study.curves:
-        times = [p.seconds for p in curve.points if p.error <= tolerance]
-        found[curve.label] = min(times) if times else float("nan")
+    found = {curve.label: curve.seconds_for(tolerance) for curve in study.curves}
     return f"for an error of {page.scientific(tolerance, 1)}, {page.listed(found)}"
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from markupsafe import Markup
 
-from phigen.analysis.precision import Curve, Study
+from phigen.analysis.precision import Study
 from phigen.report import page
 from phigen.report.drawable import drawable
 
@@ -47,16 +47,11 @@ def _conditions(study: Study) -> str:
 def _to_reach(study: Study) -> Markup:
     columns = [("", "relative error of the solution"), *(("number measured", c.label) for c in study.curves)]
     rows = [
-        (page.scientific(t, 1), [("number measured", _seconds(c, t)) for c in study.curves])
+        (page.scientific(t, 1), [("number measured", page.scientific(c.seconds_for(t))) for c in study.curves])
         for t in TOLERANCES
         if t > study.floor
     ]
     return page.table("Seconds until the error is no larger than this (measured)", columns, rows)
-
-
-def _seconds(curve: Curve, tolerance: float) -> str:
-    times = [p.seconds for p in curve.points if p.error <= tolerance]
-    return page.scientific(min(times)) if times else "–"
 
 
 def _all(study: Study) -> Markup:

@@ -190,6 +190,10 @@ class Spec:
         """Number of coordinates."""
         return len(self.coordinates)
 
+    def parameters_of(self, run: Run) -> dict[str, float]:
+        """The values of all parameters in a run: its own, else the defaults."""
+        return {p.name: float(run.parameters.get(p.name, p.value)) for p in self.parameters}
+
     def diagnostic(self, path: tuple[Any, ...], message: str, hint: str = "") -> Diagnostic:
         """A diagnostic at the part with that path of keys, or at the nearest part around it."""
         while path and path not in self.locations:

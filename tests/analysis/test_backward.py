@@ -20,7 +20,7 @@ def subject(name):
     """The modified Hamiltonian, method and start of the first run of a system of the corpus."""
     compilation = compiled(name)
     run = next(iter(compilation.spec.runs.values()))
-    values = {p.name: float(run.parameters.get(p.name, p.value)) for p in compilation.spec.parameters}
+    values = compilation.spec.parameters_of(run)
     x = np.array([float(v) for v in run.initial])
     gauge = gauge_at(compilation, x, values)
     method = of_solver(solver_of(compilation, "c"), values, gauge)

@@ -228,7 +228,7 @@ def test_command_for_machines_and_exit_code(file, monkeypatch):
 def test_every_row_has_a_meaning_which_the_documentation_gives(name):
     compilation = compile_spec(compiled(name).spec, extras=Extras(tangent=True))
     run = next(iter(compilation.spec.runs.values()))
-    values = {p.name: float(run.parameters.get(p.name, p.value)) for p in compilation.spec.parameters}
+    values = compilation.spec.parameters_of(run)
     solvers = {"numpy": solver_of(compilation, "numpy")}
     start = [float(v) for v in run.initial]
     found = verification.verify(compilation, solvers, run.name, start, values, float(run.step), 8, quick=True)

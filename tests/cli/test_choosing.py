@@ -33,7 +33,7 @@ def energy_error(name, kind, order, step, gauge="auto"):
     made = built(name, Setting(kind, int(order), gauge, "auto" if kind == SPLITTING else "none"))
     spec, system, _ = described(name)
     run = next(iter(spec.runs.values()))
-    values = {p.name: float(run.parameters.get(p.name, p.value)) for p in spec.parameters}
+    values = spec.parameters_of(run)
     problem = Problem(system, np.array([float(v) for v in run.initial]), values, float(step), 1e4)
     return energy_measure(problem)(Candidate(made.solver(), problem), float(step), 1e4).measured
 

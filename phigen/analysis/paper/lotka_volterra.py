@@ -12,6 +12,7 @@ from phigen.analysis import classical
 from phigen.analysis.arrays import Floats
 from phigen.analysis.drawing.error_curves import ROUNDING
 from phigen.analysis.drawing.palette import PALETTE, SERIES, styled
+from phigen.analysis.methods import field_of
 from phigen.analysis.paper.plate import Finding, Plate, compiled, relative, trajectory_of
 from phigen.analysis.summary import exact_solution
 from phigen.compiler import Compilation
@@ -130,8 +131,7 @@ def singularity_plate() -> Plate:
     x0, steps = [float(v) for v in found.run.initial], round(END / COARSE)
     own, stopped = _until_it_fails(found.solver, x0, COARSE, steps)
     _, fine = _until_it_fails(found.solver, x0, COARSE / 10, 10 * steps)
-    other = classical.integrate("rk2", lambda x: found.solver.backend.vector_field(x[None], {})[0], np.array(x0),
-                                COARSE, steps)  # fmt: skip
+    other = classical.integrate("rk2", field_of(found.solver, {}), np.array(x0), COARSE, steps)
     passed = int(found.end / COARSE) + 1
     finite = np.flatnonzero(np.isfinite(other).all(axis=1))[-1]
     findings = (

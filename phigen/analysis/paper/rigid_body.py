@@ -51,7 +51,7 @@ def bodies() -> Bodies:
     """PHI-2 of the paper and phigen's choice at order 4."""
     compilation, solver = compiled(SPEC, 2, "cayley")
     run = compilation.spec.runs[RUN]
-    parameters = {p.name: float(p.value) for p in compilation.spec.parameters}
+    parameters = compilation.spec.parameters_of(run)
     x0 = np.array([float(v) for v in run.initial])
     return Bodies(compilation, solver, compiled(SPEC, 4)[1], x0, float(run.step), parameters)
 
