@@ -121,7 +121,8 @@ def pieces(program: Program, values: Mapping[str, Any]) -> list[str]:
     if not blocks(program):
         return [render("c", f"{template}.c", values) for template in ("integrate", *ensemble)]
     kernel = program.kernels["linearise"]
-    found = [render("c", "lanes.c", values), *lane_functions(program, {e.op for e in topological(kernel.roots)})]
+    found = [render("c", f"{template}.c", values) for template in ("lanes", "table")]
+    found += lane_functions(program, {e.op for e in topological(kernel.roots)})
     found.append(function(program, kernel, lanes=True) + "\n")
     found.append(function(program, _without_matrices(kernel), lanes=True) + "\n")
     if "invert" in program.kernels:
