@@ -120,6 +120,7 @@ def _split(spec: Spec, source: System, order: int | None, described: Mapping[str
     gauge = Gauge() if isinstance(spec.gauge, str) else given(source, spec.gauge)
     splitting = clock.timed("splitting", lambda: arranged(split(gauge.applied(source))))
     plan, method = plan_splitting(source, order or spec.order, spec.composition)
+    described = {**described, "lanes": spec.solver.lanes}
     program = clock.timed("program", lambda: build_splitting(source, splitting, plan, method, gauge, **described))
     return Compilation(spec, source, None, plan, program, gauge, clock.seconds, splitting)
 

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 33f88df6ed1e906799d412d1ae2150f97269e8a7a4f1ff5d94a185f5b95bf04c
+ * body-sha256: 355a91a1f350374782c8205a7e2337fa1721f955e0675a0d95badf0dea494633
  */
 #include "kepler.h"
 
@@ -28,7 +28,7 @@ const kepler_params kepler_default_params = { 1.0 };
 /* A step of size h is the composition of these fractions of it. */
 static const double kepler_fractions[1] = { 1.0 };
 
-/* Very long functions compile in quadratic time: their parts are kept apart. */
+/* Functions to be kept apart: very long ones compile in quadratic time. */
 #if defined(__GNUC__)
 #define kepler_APART __attribute__((noinline))
 #else

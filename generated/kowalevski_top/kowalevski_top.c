@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: cc5e70dcfd647edd048a5c60d33d7a0b8bd19905d062a9f25c84a8cb4a190455
+ * body-sha256: 276fa64be0c99c7858160adadde72086e4e37774d83768ab1b7accabdf056844
  */
 #include "kowalevski_top.h"
 
@@ -28,7 +28,7 @@ const kowalevski_top_params kowalevski_top_default_params = { 0 };
 /* A step of size h is the composition of these fractions of it. */
 static const double kowalevski_top_fractions[1] = { 1.0 };
 
-/* Very long functions compile in quadratic time: their parts are kept apart. */
+/* Functions to be kept apart: very long ones compile in quadratic time. */
 #if defined(__GNUC__)
 #define kowalevski_top_APART __attribute__((noinline))
 #else

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 0a54136fc39272744b98af8c6e75a63d707cd606b77409eea7d6915175236097
+ * body-sha256: 369fc92affc86ddeccd1540f97e62d8490d999fab6b3f673fe54716a991e50eb
  */
 #include "lagrange_top.h"
 
@@ -28,7 +28,7 @@ const lagrange_top_params lagrange_top_default_params = { 2.0, 1.0, 1.0 };
 /* A step of size h is the composition of these fractions of it. */
 static const double lagrange_top_fractions[1] = { 1.0 };
 
-/* Very long functions compile in quadratic time: their parts are kept apart. */
+/* Functions to be kept apart: very long ones compile in quadratic time. */
 #if defined(__GNUC__)
 #define lagrange_top_APART __attribute__((noinline))
 #else

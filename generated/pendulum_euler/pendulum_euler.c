@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: dea92fb9e97e70135729adbc10049fcd90be792e741960727ff7ec138a60b5bd
+ * body-sha256: cfd0f1cd84f0ebdda0d8e12bf440afaff7b4d7603ca57b67f3bb445e7062cf96
  */
 #include "pendulum_euler.h"
 
@@ -27,6 +27,13 @@ const pendulum_euler_params pendulum_euler_default_params = { 1.0 };
 
 /* A step of size h is the composition of these fractions of it. */
 static const double pendulum_euler_fractions[1] = { 1.0 };
+
+/* Functions to be kept apart: very long ones compile in quadratic time. */
+#if defined(__GNUC__)
+#define pendulum_euler_APART __attribute__((noinline))
+#else
+#define pendulum_euler_APART
+#endif
 
 /* everything that depends on parameters and step size only */
 static void pendulum_euler_prepare(const pendulum_euler_params *params, double h, double coef[restrict 2])
@@ -133,25 +140,228 @@ pendulum_euler_status pendulum_euler_integrate(pendulum_euler_solver *s, double 
     return pendulum_euler_OK;
 }
 
+/*
+ * Eight at a time: below, the formulas of a step are evaluated for 8 steps of a trajectory, or members of an
+ * ensemble, at once. Compilers make vector instructions of the loops over lanes.
+ */
+enum { pendulum_euler_LANES = 8 };
+
+#if defined(__GNUC__)
+typedef double pendulum_euler_lanes[pendulum_euler_LANES] __attribute__((aligned(64))); /* a value in each lane */
+#else
+typedef double pendulum_euler_lanes[pendulum_euler_LANES];
+#endif
+
+#if defined(__clang__)
+#define pendulum_euler_EACH_LANE _Pragma("clang loop vectorize(assume_safety)")
+#pragma clang diagnostic push
+#pragma clang diagnostic ignored "-Wpass-failed"
+#elif defined(__GNUC__)
+#define pendulum_euler_EACH_LANE _Pragma("GCC ivdep") _Pragma("GCC unroll 1")
+#else
+#define pendulum_euler_EACH_LANE
+#endif
+
+/* sin u for the loops over lanes: u = k pi + r with |r| <= pi/2, no branches. Infinite beyond |u| = 1000000.0. */
+static inline double pendulum_euler_sin_lane(double u)
+{
+    const double shifted = (u * 0.3183098861837907 + 0.0) + 6755399441055744.0;
+    const double k = (shifted - 6755399441055744.0) - 0.0;
+    const double r = ((u - k * 3.141592651605606) - k * 1.9841871479187034e-09) - k * 1.1442377452219664e-17, q = r * r;
+    uint64_t parity, bits; /* the last bit of shifted is the parity of k + 0.0 */
+    double value, sum = -3.868170170630684e-23;
+    sum = sum * q + 1.9572941063391263e-20;
+    sum = sum * q + -8.22063524662433e-18;
+    sum = sum * q + 2.8114572543455206e-15;
+    sum = sum * q + -7.647163731819816e-13;
+    sum = sum * q + 1.6059043836821613e-10;
+    sum = sum * q + -2.505210838544172e-08;
+    sum = sum * q + 2.7557319223985893e-06;
+    sum = sum * q + -0.0001984126984126984;
+    sum = sum * q + 0.008333333333333333;
+    sum = sum * q + -0.16666666666666666;
+    value = r + r * q * sum;
+    memcpy(&parity, &shifted, sizeof parity);
+    memcpy(&bits, &value, sizeof bits);
+    bits ^= parity << 63;
+    memcpy(&value, &bits, sizeof bits);
+    return value + (fabs(u) <= 1000000.0 ? 0.0 : HUGE_VAL);
+}
+
+/* Members of an ensemble, one in each lane. */
+typedef struct {
+    pendulum_euler_lanes x[2], carry[2];
+} pendulum_euler_pack;
+
+enum {
+    pendulum_euler_PACKS = 4, /* in a group: while one waits for a result, the others are worked at */
+    pendulum_euler_GROUP = pendulum_euler_PACKS * pendulum_euler_LANES,
+    pendulum_euler_STRETCH = 32 /* steps before the members are looked at: what is not finite stays so */
+};
+
+/* pendulum_euler_explicit in all lanes. */
+static void pendulum_euler_explicit_lanes(const double coef[2], pendulum_euler_lanes state[restrict 2],
+                                          pendulum_euler_lanes increment[restrict 2])
+{
+    pendulum_euler_EACH_LANE
+    for (int lane = 0; lane < pendulum_euler_LANES; ++lane) {
+        const double q = state[0][lane];
+        const double p = state[1][lane];
+        const double t1 = coef[0] * pendulum_euler_sin_lane(q);
+        increment[0][lane] = coef[1] * (p - t1);
+        increment[1][lane] = -t1;
+    }
+}
+
+/* pendulum_euler_attempt for the members of a pack; the sums are those of pendulum_euler_advance. */
+static inline void pendulum_euler_attempt_lanes(const double *coef, pendulum_euler_pack *pack)
+{
+    pendulum_euler_lanes increment[2];
+    pendulum_euler_explicit_lanes(coef, pack->x, increment);
+    for (int i = 0; i < 2; ++i) {
+        double *x = pack->x[i], *carry = pack->carry[i];
+        pendulum_euler_EACH_LANE
+        for (int lane = 0; lane < pendulum_euler_LANES; ++lane) {
+            const double change = increment[i][lane], sum = x[lane] + change, added = sum - x[lane];
+            const double small = ((x[lane] - (sum - added)) + (change - added)) + carry[lane];
+            x[lane] = sum + small;
+            carry[lane] = small - (x[lane] - sum);
+        }
+    }
+}
+
+/* Steps of some packs: as in pendulum_euler_stages, each stage for all of them. */
+static void pendulum_euler_steps_lanes(const pendulum_euler_solver *s, pendulum_euler_pack *pack, int packs, int steps)
+{
+    for (int step = 0; step < steps; ++step)
+        for (int stage = 0; stage < 1; ++stage)
+            for (int k = 0; k < packs; ++k) pendulum_euler_attempt_lanes(s->coef[stage], &pack[k]);
+}
+
+/* Members of an ensemble, in packs. */
+typedef struct {
+    pendulum_euler_solver s; /* parameters and coefficients, the same for all */
+    pendulum_euler_pack pack[pendulum_euler_PACKS];
+    int packs; /* in use */
+    int active[pendulum_euler_GROUP];  /* whether there is such a member, and it has not left */
+    size_t left[pendulum_euler_GROUP]; /* steps that it has still to make */
+} pendulum_euler_group;
+
+/* How many active members have values that are not finite, and which. */
+static int pendulum_euler_group_lost(const pendulum_euler_group *group, int lost[pendulum_euler_GROUP])
+{
+    int count = 0;
+    for (int m = 0; m < pendulum_euler_GROUP; ++m) {
+        int finite = 1;
+        for (int i = 0; i < 2; ++i)
+            finite = finite && isfinite(group->pack[m / pendulum_euler_LANES].x[i][m % pendulum_euler_LANES]);
+        lost[m] = group->active[m] && !finite;
+        count += lost[m];
+    }
+    return count;
+}
+
+static void pendulum_euler_pack_copy(pendulum_euler_pack *to, const pendulum_euler_pack *from, int lane)
+{
+    for (int i = 0; i < 2; ++i) {
+        to->x[i][lane] = from->x[i][lane];
+        to->carry[i][lane] = from->carry[i][lane];
+    }
+}
+
+/* Some steps of all members. One whose values are not finite then leaves, with its state before them. How many remain. */
+static int pendulum_euler_group_steps(pendulum_euler_group *group, int steps)
+{
+    pendulum_euler_pack before[pendulum_euler_PACKS];
+    int lost[pendulum_euler_GROUP], active = 0;
+    memcpy(before, group->pack, sizeof before);
+    pendulum_euler_steps_lanes(&group->s, group->pack, group->packs, steps);
+    pendulum_euler_group_lost(group, lost);
+    for (int m = 0; m < pendulum_euler_GROUP; ++m) {
+        const int pack = m / pendulum_euler_LANES;
+        group->active[m] = group->active[m] && !lost[m];
+        if (group->active[m]) group->left[m] -= (size_t)steps;
+        else pendulum_euler_pack_copy(&group->pack[pack], &before[pack], m % pendulum_euler_LANES);
+        active += group->active[m];
+    }
+    return active;
+}
+
+/* The end of a member: if it left the group, by its remaining steps, one by one. */
+static pendulum_euler_status pendulum_euler_group_end(const pendulum_euler_group *group, int m, double h, double x[2])
+{
+    const pendulum_euler_pack *pack = &group->pack[m / pendulum_euler_LANES];
+    pendulum_euler_solver s = group->s;
+    for (int i = 0; i < 2; ++i) {
+        s.x[i] = pack->x[i][m % pendulum_euler_LANES];
+        s.carry[i] = pack->carry[i][m % pendulum_euler_LANES];
+    }
+    const pendulum_euler_status status = pendulum_euler_integrate(&s, h, group->left[m]);
+    memcpy(x, s.x, sizeof s.x);
+    return status;
+}
+
+/* The members from first on, as many as a group holds. The first status that is not OK. */
+pendulum_euler_APART static pendulum_euler_status pendulum_euler_group_run(
+    const pendulum_euler_params *params, double *x, size_t members, size_t first, double h, size_t steps,
+    unsigned char *status)
+{
+    pendulum_euler_group group;
+    pendulum_euler_status worst = pendulum_euler_OK, member[pendulum_euler_GROUP];
+    const int count = members - first < pendulum_euler_GROUP ? (int)(members - first) : pendulum_euler_GROUP;
+    double state[2];
+    memset(&group, 0, sizeof group);
+    group.packs = (count + pendulum_euler_LANES - 1) / pendulum_euler_LANES;
+    for (int m = 0; m < count; ++m) {
+        for (size_t i = 0; i < 2; ++i) state[i] = x[i * members + first + (size_t)m];
+        for (int i = 0; i < 2; ++i) group.pack[m / pendulum_euler_LANES].x[i][m % pendulum_euler_LANES] = state[i];
+        member[m] = pendulum_euler_init(&group.s, params, state);
+        group.active[m] = member[m] == pendulum_euler_OK;
+        group.left[m] = steps;
+    }
+    int active = pendulum_euler_set_step(&group.s, h) == pendulum_euler_OK;
+    for (size_t left = steps; left > 0 && active > 0;) {
+        const int stretch = left < pendulum_euler_STRETCH ? (int)left : pendulum_euler_STRETCH;
+        active = pendulum_euler_group_steps(&group, stretch);
+        left -= (size_t)stretch;
+    }
+    for (int m = 0; m < count; ++m) {
+        if (member[m] == pendulum_euler_OK) {
+            member[m] = pendulum_euler_group_end(&group, m, h, state);
+            for (size_t i = 0; i < 2; ++i) x[i * members + first + (size_t)m] = state[i];
+        }
+        if (status != NULL) status[first + (size_t)m] = (unsigned char)member[m];
+        if (worst == pendulum_euler_OK) worst = member[m];
+    }
+    return worst;
+}
+
 pendulum_euler_status pendulum_euler_ensemble(const pendulum_euler_params *params, double *x, size_t members,
                                               double h, size_t steps, unsigned char *status)
 {
     pendulum_euler_status worst = pendulum_euler_OK;
+    size_t earliest = members;
     if (x == NULL && members > 0) return pendulum_euler_BAD_ARGUMENT;
-    for (size_t m = 0; m < members; ++m) {
-        pendulum_euler_solver s;
-        double x0[2];
-        for (size_t i = 0; i < 2; ++i) x0[i] = x[i * members + m];
-        pendulum_euler_status member = pendulum_euler_init(&s, params, x0);
-        if (member == pendulum_euler_OK) {
-            member = pendulum_euler_integrate(&s, h, steps);
-            for (size_t i = 0; i < 2; ++i) x[i * members + m] = s.x[i];
+#ifdef _OPENMP
+#pragma omp parallel for schedule(dynamic)
+#endif
+    for (size_t first = 0; first < members; first += pendulum_euler_GROUP) {
+        const pendulum_euler_status group = pendulum_euler_group_run(params, x, members, first, h, steps, status);
+        if (group == pendulum_euler_OK) continue;
+#ifdef _OPENMP
+#pragma omp critical
+#endif
+        if (first < earliest) {
+            earliest = first;
+            worst = group;
         }
-        if (status != NULL) status[m] = (unsigned char)member;
-        if (worst == pendulum_euler_OK) worst = member;
     }
     return worst;
 }
+
+#if defined(__clang__)
+#pragma clang diagnostic pop
+#endif
 
 /* the Hamiltonian */
 static void pendulum_euler_energy(const pendulum_euler_params *params, const double x[2],

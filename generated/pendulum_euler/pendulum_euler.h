@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: d24353fc53e51eaa73095e7d11e2cf7395971fc310bfda782abb540e2d663eba
+ * body-sha256: 0234ece9f529afcd16a615023a1cf9b9464b1e15bbe3a1206fe927758fe3df5a
  */
 #ifndef PENDULUM_EULER_H
 #define PENDULUM_EULER_H
@@ -67,7 +67,8 @@ pendulum_euler_status pendulum_euler_step(pendulum_euler_solver *s, double h);
 /* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 pendulum_euler_status pendulum_euler_integrate(pendulum_euler_solver *s, double h, size_t steps);
 
-/* Many members, in place: x[i * members + m] is coordinate i of member m. Each is integrated by itself.
+/* Many members, in place: x[i * members + m] is coordinate i of member m. 32 are integrated
+   side by side, and with OpenMP such groups in parallel.
    status (or NULL) receives the status of each member; a failed member keeps its last good state.
    Returns the first status that is not OK. */
 pendulum_euler_status pendulum_euler_ensemble(const pendulum_euler_params *params, double *x, size_t members,

@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: f60fe48862f567ab1cabc6641bc9c6dbc37b93a8a409062850fbfb4a22477887
+ * body-sha256: 18c62d6b74921e6442f0db0fdb8312e77c77e2a06375ba3a9a34859e4b55fc1d
  */
 #include "so4_manakov.h"
 
@@ -29,7 +29,7 @@ const so4_manakov_params so4_manakov_default_params = { 0 };
 /* A step of size h is the composition of these fractions of it. */
 static const double so4_manakov_fractions[1] = { 1.0 };
 
-/* Very long functions compile in quadratic time: their parts are kept apart. */
+/* Functions to be kept apart: very long ones compile in quadratic time. */
 #if defined(__GNUC__)
 #define so4_manakov_APART __attribute__((noinline))
 #else

@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 0c06c8e6bc1f2c0d81e6d26ea0f0b8cc84f8c626722da19608491d42e8d295c7
+ * body-sha256: 0232023473c666979f1d97ecfe5f1a65123b6c0b38cdc24b6a1b5f6ff879d5ac
  */
 #include "spin_chain5.h"
 
@@ -29,7 +29,7 @@ const spin_chain5_params spin_chain5_default_params = { 1.0 };
 /* A step of size h is the composition of these fractions of it. */
 static const double spin_chain5_fractions[1] = { 1.0 };
 
-/* Very long functions compile in quadratic time: their parts are kept apart. */
+/* Functions to be kept apart: very long ones compile in quadratic time. */
 #if defined(__GNUC__)
 #define spin_chain5_APART __attribute__((noinline))
 #else

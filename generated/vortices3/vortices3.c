@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 2c5dc16c592c47dd78383944c747ff54b6486079fafd870eef740c836f675dd0
+ * body-sha256: fa0991e013787c91bd55e02c8acb9c761d8d5a14214f202977d7530a3b054afe
  */
 #include "vortices3.h"
 
@@ -28,7 +28,7 @@ const vortices3_params vortices3_default_params = { 0 };
 /* A step of size h is the composition of these fractions of it. */
 static const double vortices3_fractions[1] = { 1.0 };
 
-/* Very long functions compile in quadratic time: their parts are kept apart. */
+/* Functions to be kept apart: very long ones compile in quadratic time. */
 #if defined(__GNUC__)
 #define vortices3_APART __attribute__((noinline))
 #else

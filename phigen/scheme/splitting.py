@@ -59,6 +59,7 @@ def build_splitting(
     title: str = "",
     licence: str = "0BSD",
     spec_sha256: str = "",
+    lanes: bool = True,
 ) -> Program:
     """The explicit solver as a program. LimitError if a kernel exceeds `MOST_OPERATIONS`."""
     _expect_no_modified(system, extras)
@@ -95,6 +96,7 @@ def build_splitting(
         extras=extras,
         license=licence,
         spec_sha256=spec_sha256,
+        lanes=lanes,
         facts=tuple(fact for fact in (*gauge.facts, *facts(splitting, method, steps), order.note) if fact),
         operations=_operations([kernels[f"flow{k}"] for k in range(1, len(splitting.flows) + 1)], steps),
     )

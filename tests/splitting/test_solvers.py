@@ -79,7 +79,7 @@ def test_step_size_and_parameters_are_those_of_the_call(target):
     assert np.max(np.abs(solve.step([1.0, 0.5], 0.3) - there)) > 1e-2
     many = solve.ensemble([[1.0, 0.5], [0.0, 2.0]], 0.3, 7, g=2.0)
     alone = [solve.integrate(x, 0.3, 7, g=2.0).x[-1] for x in ([1.0, 0.5], [0.0, 2.0])]
-    assert np.array_equal(many, alone)
+    np.testing.assert_allclose(many, alone, rtol=0, atol=1e-15)
 
 
 @pytest.mark.parametrize("target", TARGETS)

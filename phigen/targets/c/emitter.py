@@ -7,7 +7,7 @@ from typing import Any
 
 from phigen.scheme.program import Program
 from phigen.targets import special
-from phigen.targets.c import extras, lanes, small, splitting
+from phigen.targets.c import extras, lanes, packs, small, splitting
 from phigen.targets.c.kernels import LANES, apart, function, members, printer, wrapped_arguments
 from phigen.targets.header import CHECKSUM, checksum, header_lines, plain
 from phigen.targets.path import Syntax, kinds, reads_coefficients, statements
@@ -92,6 +92,7 @@ def _values(program: Program) -> dict[str, object]:
         **{f"{key}_signature": "\n".join(lines) for key, lines in _signatures(program).items()},
         "apart": apart(program),
         **lanes.values(program, _memory_values(program)),
+        **packs.values(program),
         "pivoting": f"{program.name}_solve" + ("_pivoting" if "eliminate" in program.kernels else ""),
     }
 
@@ -233,7 +234,8 @@ def _body(program: Program) -> str:
         pieces += extras.tangent(program, values, _path_syntax(program))
     if "modified" in kernels:
         pieces += extras.modified(program, values)
-    pieces += [_render("api.c", values), *lanes.pieces(program, values)]
+    pieces += [_render("api.c", values)]
+    pieces += packs.pieces(program, values) if packs.packed(program) else lanes.pieces(program, values)
     pieces += [static("energy"), exported("casimirs"), exported("vector_field")]
     if any(apart(program) in piece for piece in pieces):
         pieces.insert(1, _render("apart.c", values))

@@ -20,7 +20,7 @@ FUNCTIONS = {name: name for name in _SAME} | {
     "abs": "fabs",
     "power": "pow",
     "sign": "(double)(({0} > 0.0) - ({0} < 0.0))",
-    "inv": "({0} > 0.0 ? 1.0 / ({0}) : NAN)",
+    "inv": "({0} > 0.0 ? 1.0 / ({0}) : (double)NAN)",
     "versin": "(2.0 * sin(0.5 * ({0})) * sin(0.5 * ({0})))",
 }
 # Digits, since -std=c99 hides M_PI.
@@ -48,19 +48,20 @@ def function(
     *,
     exported: bool = False,
     lanes: bool = False,
-    functions: Mapping[str, str] = FUNCTIONS,
+    shared: Sequence[str] = (),
+    functions: Mapping[str, str] | None = None,
 ) -> str:
     """The C source of a kernel: one function, or a chain of static ones that share a workspace.
 
-    With ``lanes`` the kernel is evaluated at `LANES` points: each value becomes an array over them.
-    ``functions`` are the names of those that it calls.
+    With ``lanes`` the kernel is evaluated at `LANES` points: each value becomes an array over them, but for the inputs
+    that are ``shared``. ``functions`` are the names of those that it calls.
     """
     pieces = parts(lower(kernel), LONGEST_FUNCTION)
     workspace = 1 + max((int(a.target[2:]) for p in pieces for a in p.assignments if a.target[:2] == "w:"), default=0)
-    if lanes:
-        own = {f: f"{program.name}_{f}_lane" for f in LANE_FUNCTIONS}
-        functions = {**functions, **own, **{f: text.format_map(own) for f, text in LANE_FORMULAS.items()}}
-    form = Form(f"{program.name}_{kernel.name}{'_lanes' if lanes else ''}", exported, lanes, functions)
+    if functions is None:
+        functions = lane_calls(program) if lanes else FUNCTIONS
+    name = f"{program.name}_{kernel.name}{'_lanes' if lanes else ''}"
+    form = Form(name, exported, lanes, functions, frozenset(shared))
     if len(pieces) == 1:
         return _definition(program, kernel, form, pieces[0])
     texts = []
@@ -76,21 +77,28 @@ def function(
     return "\n\n".join([*texts, "\n".join([*lines, "}"])])
 
 
+def lane_calls(program: Program) -> Mapping[str, str]:
+    """The functions that the loops over lanes call: their own versions where there are such."""
+    own = {f: f"{program.name}_{f}_lane" for f in LANE_FUNCTIONS}
+    return {**FUNCTIONS, **own, **{f: text.format_map(own) for f, text in LANE_FORMULAS.items()}}
+
+
 @dataclass(frozen=True)
 class Form:
-    """How a kernel is printed: name and linkage; at one point or in lanes; what it calls; whole, or a ``part``."""
+    """How a kernel is printed: name and linkage; at one point or in lanes; what it calls; which inputs all lanes share;
+    whole, or a ``part``."""
 
     name: str
     exported: bool = False
     lanes: bool = False
     functions: Mapping[str, str] = field(default_factory=lambda: FUNCTIONS)
+    shared: frozenset[str] = frozenset()
     workspace: int = 0
     part: tuple[int, int] = (1, 1)
 
-    @property
-    def lane(self) -> str:
+    def lane(self, array: str) -> str:
         """The inner index of an array."""
-        return "[lane]" if self.lanes else ""
+        return "[lane]" if self.lanes and array not in self.shared else ""
 
 
 def _purpose(program: Program, kernel: Kernel, form: Form) -> str:
@@ -119,12 +127,13 @@ def _signature(program: Program, kernel: Kernel, form: Form) -> list[str]:
     # C99 has no conversion from double (*)[8] to const double (*)[8]: the inputs of lanes are not const.
     number = f"{program.name}_lanes" if form.lanes else "double"
     given, alone = (number, "restrict ") if form.lanes else ("const double", "")
+    kinds = {i: ("const double", "") if i in form.shared else (given, alone) for i in kernel.inputs}
     arguments = [
         f"const {program.name}_params *params"
         if i == "params"
         else "double h"
         if i == "h"
-        else f"{given} {i}[{alone}{max(1, len(symbols))}]"
+        else f"{kinds[i][0]} {i}[{kinds[i][1]}{max(1, len(symbols))}]"
         for i, symbols in kernel.inputs.items()
     ]
     # restrict: the outputs never overlap the inputs of our own calls; callers of the API get no such duty.
@@ -152,8 +161,7 @@ def wrapped_arguments(head: str, arguments: Sequence[str]) -> list[str]:
 
 def _body(program: Program, kernel: Kernel, form: Form, code: Code) -> list[str]:
     arrays = [*kernel.inputs, *(o.name for o in kernel.outputs), "work", "lane"]
-    end = "_lane" if form.lanes else ""
-    special = {f"function:{f}": f"{program.name}_{f}{end}" for f in (*SPECIAL, *ENTIRE)}
+    special = {f"function:{f}": form.functions.get(f, f"{program.name}_{f}") for f in (*SPECIAL, *ENTIRE)}
     scope = Scope({*C_RESERVED, *arrays, *special.values(), *form.functions.values()})
     for f, name in special.items():
         scope.bind(f, name)
@@ -170,17 +178,17 @@ def _body(program: Program, kernel: Kernel, form: Form, code: Code) -> list[str]
             elif array == "params":
                 scope.bind(s, f"params->{member[s]}")
             elif ":" in s:
-                scope.bind(s, f"{array}[{i}]{form.lane}")
+                scope.bind(s, f"{array}[{i}]{form.lane(array)}")
             else:
-                lines.append(f"    const double {scope[s]} = {array}[{i}]{form.lane};")
+                lines.append(f"    const double {scope[s]} = {array}[{i}]{form.lane(array)};")
     for k in range(form.workspace):
-        scope.bind(f"w:{k}", f"work[{k}]{form.lane}")
+        scope.bind(f"w:{k}", f"work[{k}]{form.lane('work')}")
     show = printer(scope, form.functions)
     for a in code.assignments:
         declare = "" if a.target.startswith("w:") else "const double "
         lines.append(f"    {declare}{scope[a.target]} = {show(a.value)};")
     filled = {s.array for s in code.stores}
-    lines += [f"    {s.array}[{s.index}]{form.lane} = {show(s.value)};" for s in code.stores]
+    lines += [f"    {s.array}[{s.index}]{form.lane(s.array)} = {show(s.value)};" for s in code.stores]
     unused = [i for i in kernel.inputs if i not in touched]
     unused += [o.name for o in kernel.outputs if o.name not in filled]
     if form.workspace and not any("work[" in line for line in lines):

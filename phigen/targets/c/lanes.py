@@ -24,7 +24,7 @@ PASSES, PASSES_OF_CALLS = 2, 1
 FROZEN = 1e-5
 
 #: Functions that are instructions, or arithmetic.
-_INLINE = {"abs", "sqrt", "sign", "inv"}
+INLINE = {"abs", "sqrt", "sign", "inv"}
 
 #: Templates in the order in which they call one another.
 _MODELS = ("sizes", "correct", "near_lanes", "solved")
@@ -73,7 +73,7 @@ def vectorised(program: Program) -> bool:
     """Whether compilers can make vector instructions of the lanes: not of calls to functions of the library."""
     if not blocks(program):
         return False
-    calls = set(FUNCTIONS) - set(LANE_FUNCTIONS) - set(LANE_FORMULAS) - _INLINE
+    calls = set(FUNCTIONS) - set(LANE_FUNCTIONS) - set(LANE_FORMULAS) - INLINE
     return not calls & {e.op for e in topological(program.kernels["linearise"].roots)}
 
 
@@ -97,6 +97,7 @@ def values(program: Program, memory: Mapping[str, int]) -> Mapping[str, object]:
         if grouped
         else "Each is integrated by itself.",
         "ensemble_templates": _GROUPS if grouped else ("ensemble_members",),
+        "group_size": "LANES",
         "block_members": _MEMBERS if blocks(program) else [],
         **_group_values(program),
         "block_reset": _RESET if blocks(program) else [],

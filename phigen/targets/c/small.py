@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Set
 from fractions import Fraction
 
 from phigen.scheme.program import Program
@@ -15,6 +15,9 @@ from phigen.targets.special import entire_used
 
 #: The names under which flows call functions that have a version here.
 FLOW_FUNCTIONS = ("expm1", "sin", "versin")
+
+#: Those that are polynomials near 0.
+NEAR_FUNCTIONS = (*ENTIRE, *FLOW_FUNCTIONS)
 
 
 def _inverse_factorials(first: int, step: int, count: int, signs: int) -> list[Fraction]:
@@ -47,37 +50,33 @@ _FAR = {
 
 def pieces(program: Program) -> list[str]:
     """The functions of `ENTIRE` that kernels call, and for a splitting those that flows call."""
-    found = [_entire(program, f) for f in entire_used(program)]
     flows = [kernel for name, kernel in program.kernels.items() if name.startswith(("flow", "tangent"))]
     used = {e.op for e in topological([e for kernel in flows for e in kernel.roots])}
-    return found + [_small(program, f) for f in FLOW_FUNCTIONS if program.schedule and f in used]
+    called = [f for f in FLOW_FUNCTIONS if program.schedule and f in used]
+    return [render("c", "small.c", _values(program, f)) for f in (*entire_used(program), *called)]
 
 
-def _entire(program: Program, f: str) -> str:
-    function = ENTIRE[f]
-    lines, value = estrin(function.terms(), "s")
-    return _rendered(program, f, function.meaning, "s", function.radius, _FAR[f], lines, value)
+def near(program: Program, ops: Set[str]) -> list[str]:
+    """Versions for the loops over lanes, of small arguments only, of the functions that these operations call."""
+    return [render("c", "near.c", _values(program, f)) for f in NEAR_FUNCTIONS if f in ops]
 
 
-def _small(program: Program, f: str) -> str:
-    meaning, radius, far, variable, coefficients, form = _SMALL[f]
-    lines, value = estrin(coefficients, variable)
-    if variable == "z":
-        lines.insert(0, "const double z = t * t;")
-    return _rendered(program, f, meaning, "t", radius, far, lines, form.format(P=value))
-
-
-def _rendered(
-    program: Program, f: str, meaning: str, argument: str, radius: float, far: str, lines: list[str], value: str
-) -> str:
-    values: Mapping[str, object] = {
+def _values(program: Program, f: str) -> Mapping[str, object]:
+    if f in ENTIRE:
+        found, t, form = ENTIRE[f], "s", "{P}"
+        meaning, radius, far = found.meaning, found.radius, _FAR[f]
+        lines, value = estrin(found.terms(), t)
+    else:
+        meaning, radius, far, variable, coefficients, form = _SMALL[f]
+        lines, value = estrin(coefficients, variable)
+        t, lines = "t", [*(["const double z = t * t;"] if variable == "z" else []), *lines]
+    return {
         "NAME": program.name,
         "function": f,
         "meaning": meaning,
-        "t": argument,
+        "t": t,
         "radius": repr(radius),
         "far": far.format(NAME=program.name),
         "lines": lines,
-        "value": value,
+        "value": form.format(P=value),
     }
-    return render("c", "small.c", values)

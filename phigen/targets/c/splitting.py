@@ -23,7 +23,20 @@ def pieces(program: Program, values: Mapping[str, object]) -> list[str]:
         found.append(
             render("c", "flow.c", own | {"k": k, "moved": list(enumerate(moved)), "count": max(1, len(moved))})
         )
-    return [*found, render("c", "splitting.c", own | {"step": _step(program, schedule)})]
+    return [*found, render("c", "splitting.c", own | {"step": _step(program, schedule, "", "x, carry")})]
+
+
+def in_lanes(program: Program, values: Mapping[str, object], form: str, functions: Mapping[str, str]) -> list[str]:
+    """Steps of the members of packs, which call ``functions``; ``form`` is added to the names."""
+    found, end = [], f"{form}_lanes"
+    for k, name in enumerate(_flows(program), 1):
+        kernel, moved = _compact(program.kernels[name], k)
+        kernel = replace(kernel, name=kernel.name + form)
+        found.append(function(program, kernel, lanes=True, shared=["coef"], functions=functions) + "\n")
+        own = {"k": k, "form": end, "moved": list(enumerate(moved)), "count": max(1, len(moved))}
+        found.append(render("c", "flow_lanes.c", {**values, **own}))
+    step = _step(program, schedule_of(program), end, "pack, packs")
+    return [*found, render("c", "splitting_lanes.c", {**values, "form": end, "step": step})]
 
 
 def tangent(program: Program, values: Mapping[str, object]) -> list[str]:
@@ -75,14 +88,14 @@ def _compact(kernel: Kernel, k: int) -> tuple[Kernel, list[int]]:
     return replace(kernel, name=f"change{k}", outputs=(output,)), moved
 
 
-def _step(program: Program, schedule: Schedule) -> list[str]:
-    """The calls of a step."""
+def _step(program: Program, schedule: Schedule, end: str, moved: str) -> list[str]:
+    """The calls of a step: of functions whose names end so, with what they move."""
     name, row = program.name, _values(program)["row"]
-    lines = [f"{name}_flow1(coef, x, carry);"]
+    lines = [f"{name}_flow1{end}(coef, {moved});"]
     if schedule.stages:
         lines += [f"coef += {row};", f"for (int k = 0; k < {schedule.stages}; ++k) {{"]
         for part, at in schedule.pattern:
             place = f"coef + {at} * {row}" if at else "coef"
-            lines.append(f"    {name}_flow{part + 1}({place}, x, carry);")
+            lines.append(f"    {name}_flow{part + 1}{end}({place}, {moved});")
         lines += [f"    coef += {schedule.rows} * {row};", "}"]
     return lines

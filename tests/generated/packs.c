@@ -1,0 +1,125 @@
+/* Ensembles in packs against single trajectories, from inside the generated file.
+   Compile with -DNAME=… -DSOURCE="…" -DSTEP=…, -DULPS=…, -DSTATE="…" (initial values separated by commas), and -DFAR=…,
+   for a factor of the step at which functions of flows leave the polynomials that are used near 0. */
+#include <stdio.h>
+#include <stdlib.h>
+
+#include SOURCE
+
+#define GLUE2(a, b) a##_##b
+#define GLUE(a, b) GLUE2(a, b)
+#define F(name) GLUE(NAME, name)
+#define DIM F(DIM)
+#define MOST 77
+
+#define EXPECT(condition) \
+    do { \
+        if (!(condition)) { \
+            fprintf(stderr, "%s:%d: %s\n", __FILE__, __LINE__, #condition); \
+            exit(1); \
+        } \
+    } while (0)
+
+static const double start[DIM] = { STATE };
+static double x[DIM * MOST];
+static unsigned char status[MOST];
+
+/* Members of different states, in order; no two of them are close. */
+static void member(int m, double x0[DIM])
+{
+    for (int i = 0; i < DIM; ++i) x0[i] = start[i] * (1.0 + 1e-3 * m);
+}
+
+static void fill(int members)
+{
+    double x0[DIM];
+    for (int m = 0; m < members; ++m) {
+        member(m, x0);
+        for (int i = 0; i < DIM; ++i) x[i * members + m] = x0[i];
+        status[m] = 99;
+    }
+}
+
+/* Member m is where steps from x0 lead, as far as they do, up to units of the last place of its largest coordinate. */
+static void expect_steps(int members, int m, const double x0[DIM], double h, int steps, double ulps)
+{
+    F(solver) s;
+    double size = 0.0;
+    F(status) expected = F(init)(&s, NULL, x0);
+    for (int k = 0; k < steps && expected == F(OK); ++k) expected = F(step)(&s, h);
+    EXPECT(status[m] == expected);
+    for (int i = 0; i < DIM; ++i) size = fmax(size, fabs(s.x[i]));
+    for (int i = 0; i < DIM; ++i) EXPECT(fabs(s.x[i] - x[i * members + m]) <= ulps * DBL_EPSILON * size);
+}
+
+static void members_equal_steps(int members, double h, int steps, double ulps)
+{
+    double x0[DIM];
+    fill(members);
+    EXPECT(F(ensemble)(NULL, x, (size_t)members, h, (size_t)steps, status) == F(OK));
+    for (int m = 0; m < members; ++m) {
+        member(m, x0);
+        expect_steps(members, m, x0, h, steps, ulps);
+    }
+}
+
+/* A member that has no state, and one whose first step leaves the numbers, keep theirs and do not disturb the others. */
+static void failures_stay_alone(int members, int steps)
+{
+    double x0[DIM];
+    const int bad = members / 3, large = members / 2;
+    fill(members);
+    x[bad] = (double)NAN;
+    for (int i = 0; i < DIM; ++i) x[i * members + large] = i % 2 ? -1e308 : 1e308;
+    EXPECT(F(ensemble)(NULL, x, (size_t)members, STEP, (size_t)steps, status) == F(BAD_ARGUMENT));
+    EXPECT(status[bad] == F(BAD_ARGUMENT));
+    EXPECT(isnan(x[bad]));
+    for (int m = 0; m < members; ++m) {
+        if (m == bad) continue;
+        member(m, x0);
+        for (int i = 0; i < DIM && m == large; ++i) x0[i] = i % 2 ? -1e308 : 1e308;
+        expect_steps(members, m, x0, STEP, steps, ULPS);
+    }
+}
+
+/* The packs go through all steps: what ends well is not done by single steps. Members that do not fit the polynomials
+   near 0 are not left to single steps either. */
+static void groups_make_all_steps(double h)
+{
+    static F(group) group;
+    double x0[DIM];
+    memset(&group, 0, sizeof group);
+    group.packs = F(PACKS);
+    for (int m = 0; m < F(GROUP); ++m) {
+        member(m, x0);
+        EXPECT(F(init)(&group.s, NULL, x0) == F(OK));
+        for (int i = 0; i < DIM; ++i) group.pack[m / F(LANES)].x[i][m % F(LANES)] = x0[i];
+        group.active[m] = 1;
+        group.left[m] = 40;
+    }
+    EXPECT(F(set_step)(&group.s, h) == F(OK));
+    EXPECT(F(group_steps)(&group, 30) == F(GROUP));
+    EXPECT(F(group_steps)(&group, 10) == F(GROUP));
+    for (int m = 0; m < F(GROUP); ++m) EXPECT(group.left[m] == 0);
+#if FAR > 1
+    EXPECT(group.far == (h != STEP));
+#endif
+}
+
+int main(void)
+{
+    const int counts[] = { 1, 7, 8, 19, MOST };
+    for (int k = 0; k < 5; ++k) members_equal_steps(counts[k], STEP, 70, ULPS);
+    members_equal_steps(19, -STEP, 32, ULPS);
+    members_equal_steps(19, FAR * STEP, 1, 100);
+    members_equal_steps(9, STEP, 0, 0.0);
+    failures_stay_alone(MOST, 40);
+    groups_make_all_steps(STEP);
+    groups_make_all_steps(FAR * STEP);
+    EXPECT(F(ensemble)(NULL, NULL, 3, STEP, 1, NULL) == F(BAD_ARGUMENT));
+    EXPECT(F(ensemble)(NULL, x, 0, STEP, 1, NULL) == F(OK));
+    fill(9);
+    EXPECT(F(ensemble)(NULL, x, 9, (double)NAN, 1, status) == F(BAD_ARGUMENT));
+    EXPECT(status[8] == F(BAD_ARGUMENT));
+    return 0;
+}

@@ -1,0 +1,138 @@
+"""Ensembles of splittings and explicit steps: members in packs do what single trajectories do."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support import COMMAND, SPECIES, compile_text, compiled, run, setting, solver, tool, write
+
+from phigen.compiler import emit
+from phigen.errors import StepError
+
+EXERCISE = Path(__file__).with_name("packs.c")
+
+#: Splittings, and a factor of the step at which functions leave the polynomials that are used near 0.
+FAR = {
+    "ablowitz_ladik3": 1,
+    "henon_heiles": 1,
+    "kepler": 1,
+    "lagrange_top": 500,
+    "lotka_volterra": 1,
+    "spin_chain5": 250,
+    "toda3_quadratic": 500,
+    "volterra5": 50,
+    "vortices3": 1,
+}
+
+PAIR = "coordinates: [q, p]\npoisson: {canonical: {q: [q], p: [p]}}\n"
+EULER = PAIR + "birealisation: canonical-euler\norder: 1\n"
+RUN = "runs: {one: {initial: [1, 0.5], step: 0.1, steps: 1}}\n"
+
+#: Explicit steps, and units of the last place: sin has a version of its own for lanes.
+EXPLICIT = {
+    "a quartic": (EULER + "hamiltonian: p**2/2 + q**4/4\n", 0),
+    "a pendulum": (EULER + "hamiltonian: p**2/2 - cos(q)\n", 40),
+    "five stages": (PAIR + "order: 4\ncomposition: suzuki\nhamiltonian: p**4/4 + q\n", 0),
+}
+
+
+def exercise(compilation, folder, optimisation, ulps, far):
+    """Build and run packs.c for a system."""
+    name, at = compilation.program.name, setting(compilation)
+    write(folder, emit(compilation.program, "c", COMMAND, single_file=True))
+    definitions = [f"-DNAME={name}", f'-DSOURCE="{name}.c"', f"-DSTEP={at.h!r}", f"-DULPS={ulps}", f"-DFAR={far}"]
+    definitions.append("-DSTATE=" + ", ".join(map(repr, at.x)))
+    flags = ["-std=c99", *optimisation.split(), "-Wall", "-Wextra", "-Werror", "-Wno-unused-function"]
+    run([tool("gcc"), *flags, *definitions, "-I.", EXERCISE, "-o", "packs", "-lm"], folder)
+    run([folder / "packs"], folder)
+
+
+@pytest.mark.parametrize("name", FAR)
+def test_members_of_splittings_equal_single_trajectories_bit_for_bit(name, tmp_path):
+    """Where arguments are small and products are not fused; else to round-off."""
+    exercise(compiled(name, 4, "splitting"), tmp_path, "-O1", 0, FAR[name])
+
+
+@pytest.mark.parametrize("name", ["spin_chain5", "kepler"])
+def test_vectorised_packs_equal_single_trajectories(name, tmp_path):
+    exercise(compiled(name, 4, "splitting"), tmp_path, "-O3 -march=native -ffp-contract=fast", 40, FAR[name])
+
+
+@pytest.mark.parametrize("kind", EXPLICIT)
+def test_members_of_explicit_steps_equal_single_trajectories(kind, tmp_path):
+    text, ulps = EXPLICIT[kind]
+    compilation = compile_text(text + RUN)
+    assert compilation.program.driver == "explicit"
+    exercise(compilation, tmp_path, "-O1", ulps, 1)
+
+
+#: Prints the status and the bits of all members, one of which has no state.
+THREADS = """
+#include <stdio.h>
+#include "{name}.c"
+int main(void)
+{{
+    static double x[{name}_DIM][100];
+    const double start[] = {{ {state} }};
+    for (int i = 0; i < {name}_DIM; ++i)
+        for (int m = 0; m < 100; ++m) x[i][m] = start[i] * (1.0 + 0.01 * m);
+    x[0][40] = (double)NAN;
+    printf("%d\\n", (int){name}_ensemble(NULL, &x[0][0], 100, {h!r}, 100, NULL));
+    for (int i = 0; i < {name}_DIM; ++i)
+        for (int m = 0; m < 100; ++m) printf("%a\\n", x[i][m]);
+    return 0;
+}}
+"""
+
+BLOW_UP = np.array([[0.3, 0.9, 0.6], [-3.0, 5.0, 0.001], [0.5, 0.2, 0.1]])
+
+
+@pytest.mark.parametrize("target", ["c"])
+def test_a_member_that_blows_up_keeps_its_last_state_and_disturbs_nobody(target):
+    """It fails in the midst of a stretch of steps, and not at its end."""
+    solve = solver(compile_text(SPECIES + "order: 4\n", scheme="splitting"), target)
+    with pytest.raises(StepError) as single:
+        solve.integrate(BLOW_UP[1], 1e-3, 400)
+    assert single.value.status == "NOT_FINITE"
+    assert 250 < single.value.step < 399
+    with pytest.raises(StepError) as many:
+        solve.ensemble(BLOW_UP, 1e-3, 400)
+    assert (many.value.members, many.value.status) == ((1,), "NOT_FINITE")
+    last = single.value.trajectory.x[-1]
+    np.testing.assert_allclose(many.value.trajectory[1], last, rtol=1e-9)  # near the singularity round-off grows
+    for k in (0, 2):
+        alone = solve.integrate(BLOW_UP[k], 1e-3, 400, stride=400).x[-1]
+        np.testing.assert_allclose(many.value.trajectory[k], alone, rtol=1e-13)
+
+
+def test_code_without_lanes_is_shorter_and_does_the_same():
+    body = PAIR + "hamiltonian: p**2/2 - cos(q)\norder: 4\nscheme: splitting\n"
+    with_lanes, without = compile_text(body), compile_text(f"{body}solver: {{lanes: false}}\n")
+    texts = [emit(c.program, "c", COMMAND)["t.c"] for c in (with_lanes, without)]
+    assert ["t_pack" in text for text in texts] == [True, False]
+    start = np.array([[0.1 * k, 1.0] for k in range(11)])
+    ends = [solver(c, "c").ensemble(start, 0.1, 100) for c in (with_lanes, without)]
+    np.testing.assert_allclose(ends[0], ends[1], rtol=0, atol=1e-14)
+
+
+def test_functions_without_a_version_for_lanes_leave_members_by_themselves():
+    compilation = compile_text(PAIR + "hamiltonian: p**2/2 + q*atan(q)\norder: 4\nscheme: splitting\n")
+    assert "t_pack" not in emit(compilation.program, "c", COMMAND)["t.c"]
+
+
+@pytest.mark.parametrize("name", ["kepler", "lagrange_top", "pendulum_euler"])
+def test_threads_change_no_bit(name, tmp_path):
+    """100 members are four groups, the last of which is not full."""
+    scheme = None if name == "pendulum_euler" else "splitting"
+    compilation = compiled(name, None, scheme)
+    at = setting(compilation)
+    write(tmp_path, emit(compilation.program, "c", COMMAND, single_file=True))
+    state = ", ".join(map(repr, at.x))
+    write(tmp_path, {"main.c": THREADS.format(name=name, state=state, h=at.h)})
+    printed = []
+    for flags in ([], ["-fopenmp"]):
+        run([tool("gcc"), "-std=c99", "-O2", *flags, "main.c", "-o", "main", "-lm"], tmp_path)
+        printed.append(run([tmp_path / "main"], tmp_path, OMP_NUM_THREADS="3"))
+    assert printed[0] == printed[1]
+    assert printed[0].splitlines()[0] == "4"
+    assert len(set(printed[0].splitlines())) > 90
