@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 00933d4fa3f650cdf6e2bebbf92249d6b56f309697832f7c5e21cd9f6ff8791d
+ * body-sha256: 0a87d2107cc3f67787f8bada64cd8a0056d5a0df53196bf3c1b7428b99aa541d
  */
 #ifndef CHARGED_PARTICLE_H
 #define CHARGED_PARTICLE_H
@@ -50,6 +50,7 @@ typedef enum {
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
+    int terms;    /* how many of them the recurrence uses */
     int fits;     /* how often weight has been fitted */
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */

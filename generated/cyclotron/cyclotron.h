@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: b80ef967a8087b256ddfb5032e9eed8e49bf2b89883a805b539d20359cd84bc1
+ * body-sha256: 7cb35cf99c716288fb0e9242a30b39388efbf8e45ff835a956efb64f401562eb
  */
 #ifndef CYCLOTRON_H
 #define CYCLOTRON_H
@@ -46,15 +46,16 @@ typedef enum {
 } cyclotron_status;
 
 /* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
-   fitted to the last 96 values. They affect speed only. */
+   fitted to the last 95 values. They affect speed only. */
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
+    int terms;    /* how many of them the recurrence uses */
     int fits;     /* how often weight has been fitted */
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */
     int patience; /* how many of those before the recurrence is fitted again */
-    double past[192][cyclotron_DIM]; /* values, the latest last */
+    double past[190][cyclotron_DIM]; /* values, the latest last */
     double weight[32][cyclotron_DIM][8]; /* of past values, the latest first, for the next values */
 } cyclotron_memory;
 

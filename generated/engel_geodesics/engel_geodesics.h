@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 357b0e264b6e2e1e34d6ac235ca91b4c52fa67e11b93c20e8c45691bb1f17252
+ * body-sha256: 2cf91eb79dc9ee3aea2d0f601bc45fb5d0ba12fe2d4cc8ba2bd393c743b0e343
  */
 #ifndef ENGEL_GEODESICS_H
 #define ENGEL_GEODESICS_H
@@ -46,15 +46,16 @@ typedef enum {
 } engel_geodesics_status;
 
 /* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
-   fitted to the last 96 values. They affect speed only. */
+   fitted to the last 95 values. They affect speed only. */
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
+    int terms;    /* how many of them the recurrence uses */
     int fits;     /* how often weight has been fitted */
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */
     int patience; /* how many of those before the recurrence is fitted again */
-    double past[192][engel_geodesics_DIM]; /* values, the latest last */
+    double past[190][engel_geodesics_DIM]; /* values, the latest last */
     double weight[32][engel_geodesics_DIM][8]; /* of past values, the latest first, for the next values */
 } engel_geodesics_memory;
 

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: c510ecfe056a77a26c1b5600c4222f370e3b7d6cfa80b100959be244c99f66d9
+ * body-sha256: bc85a8a080f3cf41dc2bdc196fa529fb651779d03d50153bbab9de9f988fa983
  */
 #ifndef GAUSSIAN_MOMENTS_H
 #define GAUSSIAN_MOMENTS_H
@@ -47,15 +47,16 @@ typedef enum {
 } gaussian_moments_status;
 
 /* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
-   fitted to the last 96 values. They affect speed only. */
+   fitted to the last 95 values. They affect speed only. */
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
+    int terms;    /* how many of them the recurrence uses */
     int fits;     /* how often weight has been fitted */
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */
     int patience; /* how many of those before the recurrence is fitted again */
-    double past[192][gaussian_moments_DIM]; /* values, the latest last */
+    double past[190][gaussian_moments_DIM]; /* values, the latest last */
     double weight[32][gaussian_moments_DIM][8]; /* of past values, the latest first, for the next values */
 } gaussian_moments_memory;
 

@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 1e9c73be19dd9193660c24f818565e0d565e30263e3502a2a46da0cb773d880a
+ * body-sha256: 1de94da270af4aa2ca59db7f967698785340f876dcb41d03a2da3fa2f4d63fcf
  */
 #ifndef GUIDING_CENTRE_H
 #define GUIDING_CENTRE_H
@@ -53,6 +53,7 @@ typedef enum {
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
+    int terms;    /* how many of them the recurrence uses */
     int fits;     /* how often weight has been fitted */
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 1bd76a7bd8c250c20123111beb7f18ba1e9f889186eb00c16f0e3d91be7b25d3
+ * body-sha256: b2883541553b9cd0bb8db033ea5327cfd9c8620925f778db7a1eaabb895cb049
  */
 #ifndef HARMONIC_OSCILLATOR_H
 #define HARMONIC_OSCILLATOR_H
@@ -47,15 +47,16 @@ typedef enum {
 } harmonic_oscillator_status;
 
 /* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
-   fitted to the last 96 values. They affect speed only. */
+   fitted to the last 95 values. They affect speed only. */
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
+    int terms;    /* how many of them the recurrence uses */
     int fits;     /* how often weight has been fitted */
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */
     int patience; /* how many of those before the recurrence is fitted again */
-    double past[192][harmonic_oscillator_DIM]; /* values, the latest last */
+    double past[190][harmonic_oscillator_DIM]; /* values, the latest last */
     double weight[32][harmonic_oscillator_DIM][8]; /* of past values, the latest first, for the next values */
 } harmonic_oscillator_memory;
 

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: ec66a2a80cbc7f8afab07e12f9d7a2303b2503f9fdd182a7a367942ce4ba7484
+ * body-sha256: 1f4d47338a4c8a9f86502a26c5cd3377e091a47dee90cb6ba5484b40b546ac72
  */
 #ifndef HENON_HEILES_H
 #define HENON_HEILES_H
@@ -46,15 +46,16 @@ typedef enum {
 } henon_heiles_status;
 
 /* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
-   fitted to the last 96 values. They affect speed only. */
+   fitted to the last 95 values. They affect speed only. */
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
+    int terms;    /* how many of them the recurrence uses */
     int fits;     /* how often weight has been fitted */
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */
     int patience; /* how many of those before the recurrence is fitted again */
-    double past[192][henon_heiles_DIM]; /* values, the latest last */
+    double past[190][henon_heiles_DIM]; /* values, the latest last */
     double weight[32][henon_heiles_DIM][8]; /* of past values, the latest first, for the next values */
 } henon_heiles_memory;
 

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 21a305079987374a9de07f4bfeb5d5df6345fee49152d5cfd7fac0d3577fe8ce
+ * body-sha256: 0f40c460122196b915403a55eeee27e180e66bccd396e5a1fd696f8a3e282475
  */
 #ifndef KEPLER_H
 #define KEPLER_H
@@ -46,15 +46,16 @@ typedef enum {
 } kepler_status;
 
 /* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
-   fitted to the last 96 values. They affect speed only. */
+   fitted to the last 95 values. They affect speed only. */
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
+    int terms;    /* how many of them the recurrence uses */
     int fits;     /* how often weight has been fitted */
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */
     int patience; /* how many of those before the recurrence is fitted again */
-    double past[192][kepler_DIM]; /* values, the latest last */
+    double past[190][kepler_DIM]; /* values, the latest last */
     double weight[32][kepler_DIM][8]; /* of past values, the latest first, for the next values */
 } kepler_memory;
 

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 433da3a814e12e52ecdfedbe3d4110176faa04cdfd26c5460925ba8b959474d3
+ * body-sha256: 0cbc30e06cf163417d7dba25894ef56c820689e97548dd13053cc5af958fafb5
  */
 #ifndef KOWALEVSKI_TOP_H
 #define KOWALEVSKI_TOP_H
@@ -46,15 +46,16 @@ typedef enum {
 } kowalevski_top_status;
 
 /* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
-   fitted to the last 96 values. They affect speed only. */
+   fitted to the last 95 values. They affect speed only. */
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
+    int terms;    /* how many of them the recurrence uses */
     int fits;     /* how often weight has been fitted */
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */
     int patience; /* how many of those before the recurrence is fitted again */
-    double past[192][kowalevski_top_DIM]; /* values, the latest last */
+    double past[190][kowalevski_top_DIM]; /* values, the latest last */
     double weight[32][kowalevski_top_DIM][8]; /* of past values, the latest first, for the next values */
 } kowalevski_top_memory;
 

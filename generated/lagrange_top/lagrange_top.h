@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 16d6479257ed497c294bcfc11831e67e1a4876b22ae0bcac9d0f13477b208ac8
+ * body-sha256: 498bdc97224713830668b96257b7a8a5412394285a34a1230d432f8f8493aacb
  */
 #ifndef LAGRANGE_TOP_H
 #define LAGRANGE_TOP_H
@@ -48,15 +48,16 @@ typedef enum {
 } lagrange_top_status;
 
 /* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
-   fitted to the last 96 values. They affect speed only. */
+   fitted to the last 95 values. They affect speed only. */
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
+    int terms;    /* how many of them the recurrence uses */
     int fits;     /* how often weight has been fitted */
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */
     int patience; /* how many of those before the recurrence is fitted again */
-    double past[192][lagrange_top_DIM]; /* values, the latest last */
+    double past[190][lagrange_top_DIM]; /* values, the latest last */
     double weight[32][lagrange_top_DIM][8]; /* of past values, the latest first, for the next values */
 } lagrange_top_memory;
 

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 6753c135245c5fe4ff09f42547cd91d4681b3863b60e4a9658591194c7e90841
+ * body-sha256: 33e58e095a235ea2b568ed685e1aaeefe3117cdf8e23b0155911d40bc0a12c2e
  */
 #ifndef LOTKA_VOLTERRA_H
 #define LOTKA_VOLTERRA_H
@@ -46,15 +46,16 @@ typedef enum {
 } lotka_volterra_status;
 
 /* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
-   fitted to the last 96 values. They affect speed only. */
+   fitted to the last 95 values. They affect speed only. */
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
+    int terms;    /* how many of them the recurrence uses */
     int fits;     /* how often weight has been fitted */
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */
     int patience; /* how many of those before the recurrence is fitted again */
-    double past[192][lotka_volterra_DIM]; /* values, the latest last */
+    double past[190][lotka_volterra_DIM]; /* values, the latest last */
     double weight[32][lotka_volterra_DIM][8]; /* of past values, the latest first, for the next values */
 } lotka_volterra_memory;
 

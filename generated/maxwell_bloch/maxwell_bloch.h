@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 8ce6d542217891d154268e9502560433ff09e25b7c34ac849e198e72cd73670c
+ * body-sha256: 24e8b0bc56a864c59537aab6ecdb14323f5e411f82320f19a016988ff1865513
  */
 #ifndef MAXWELL_BLOCH_H
 #define MAXWELL_BLOCH_H
@@ -46,15 +46,16 @@ typedef enum {
 } maxwell_bloch_status;
 
 /* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
-   fitted to the last 96 values. They affect speed only. */
+   fitted to the last 95 values. They affect speed only. */
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
+    int terms;    /* how many of them the recurrence uses */
     int fits;     /* how often weight has been fitted */
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */
     int patience; /* how many of those before the recurrence is fitted again */
-    double past[192][maxwell_bloch_DIM]; /* values, the latest last */
+    double past[190][maxwell_bloch_DIM]; /* values, the latest last */
     double weight[32][maxwell_bloch_DIM][8]; /* of past values, the latest first, for the next values */
 } maxwell_bloch_memory;
 

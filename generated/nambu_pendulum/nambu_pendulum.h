@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 556368325d18a06e41c91ed598459e9c172577a292c90e0cba5b88d32d2b0f25
+ * body-sha256: 197e586df139777e5792bbbadf672e07930b90860ee13e539859d9b4b298182f
  */
 #ifndef NAMBU_PENDULUM_H
 #define NAMBU_PENDULUM_H
@@ -50,6 +50,7 @@ typedef enum {
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
+    int terms;    /* how many of them the recurrence uses */
     int fits;     /* how often weight has been fitted */
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 0feacdd133ce49d0f8bc43a3563d0ba5a47df89752719a4cfacf4335d9d102e8
+ * body-sha256: db73f236a32371aca75f2b80796362f8a22dd7c56f3272792d127a0828654452
  */
 #ifndef PENDULUM_H
 #define PENDULUM_H
@@ -46,15 +46,16 @@ typedef enum {
 } pendulum_status;
 
 /* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
-   fitted to the last 96 values. They affect speed only. */
+   fitted to the last 95 values. They affect speed only. */
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
+    int terms;    /* how many of them the recurrence uses */
     int fits;     /* how often weight has been fitted */
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */
     int patience; /* how many of those before the recurrence is fitted again */
-    double past[192][pendulum_DIM]; /* values, the latest last */
+    double past[190][pendulum_DIM]; /* values, the latest last */
     double weight[32][pendulum_DIM][8]; /* of past values, the latest first, for the next values */
 } pendulum_memory;
 

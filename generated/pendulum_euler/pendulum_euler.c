@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: cfd0f1cd84f0ebdda0d8e12bf440afaff7b4d7603ca57b67f3bb445e7062cf96
+ * body-sha256: c839c35defd2e3435db2d4c967102480ced35480c8e6e20669bbf7071f5a2446
  */
 #include "pendulum_euler.h"
 
@@ -167,19 +167,18 @@ static inline double pendulum_euler_sin_lane(double u)
 {
     const double shifted = (u * 0.3183098861837907 + 0.0) + 6755399441055744.0;
     const double k = (shifted - 6755399441055744.0) - 0.0;
-    const double r = ((u - k * 3.141592651605606) - k * 1.9841871479187034e-09) - k * 1.1442377452219664e-17, q = r * r;
+    const double r = ((u - k * 3.141592651605606) - k * 1.9841871479187034e-09) - k * 1.1442377452219664e-17, q = r * r, qq = q * q;
     uint64_t parity, bits; /* the last bit of shifted is the parity of k + 0.0 */
-    double value, sum = -3.868170170630684e-23;
-    sum = sum * q + 1.9572941063391263e-20;
-    sum = sum * q + -8.22063524662433e-18;
-    sum = sum * q + 2.8114572543455206e-15;
-    sum = sum * q + -7.647163731819816e-13;
-    sum = sum * q + 1.6059043836821613e-10;
-    sum = sum * q + -2.505210838544172e-08;
-    sum = sum * q + 2.7557319223985893e-06;
-    sum = sum * q + -0.0001984126984126984;
-    sum = sum * q + 0.008333333333333333;
-    sum = sum * q + -0.16666666666666666;
+    double value, sum = -3.868170170630684e-23, other = 1.9572941063391263e-20;
+    sum = sum * qq + -8.22063524662433e-18;
+    other = other * qq + 2.8114572543455206e-15;
+    sum = sum * qq + -7.647163731819816e-13;
+    other = other * qq + 1.6059043836821613e-10;
+    sum = sum * qq + -2.505210838544172e-08;
+    other = other * qq + 2.7557319223985893e-06;
+    sum = sum * qq + -0.0001984126984126984;
+    other = other * qq + 0.008333333333333333;
+    sum = (sum * q + other) * q + -0.16666666666666666;
     value = r + r * q * sum;
     memcpy(&parity, &shifted, sizeof parity);
     memcpy(&bits, &value, sizeof bits);

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 655aad3d5d6dd4ab6e1141c9acb4080a787272b1f8e03a0e170332739aacbedb
+ * body-sha256: ce613166d2746d1120264dfeb2d66c3275ef4a9827c577f42d1e06a9628f98b4
  */
 #ifndef POISSON_NOT_HAMILTONIAN_H
 #define POISSON_NOT_HAMILTONIAN_H
@@ -46,15 +46,16 @@ typedef enum {
 } poisson_not_hamiltonian_status;
 
 /* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
-   fitted to the last 96 values. They affect speed only. */
+   fitted to the last 95 values. They affect speed only. */
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
+    int terms;    /* how many of them the recurrence uses */
     int fits;     /* how often weight has been fitted */
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */
     int patience; /* how many of those before the recurrence is fitted again */
-    double past[192][poisson_not_hamiltonian_DIM]; /* values, the latest last */
+    double past[190][poisson_not_hamiltonian_DIM]; /* values, the latest last */
     double weight[32][poisson_not_hamiltonian_DIM][8]; /* of past values, the latest first, for the next values */
 } poisson_not_hamiltonian_memory;
 

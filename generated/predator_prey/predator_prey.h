@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: efdd124fa42aa30df7cf4ce13fdb11abbed1f6783a7c9479e6fdea545d83dae7
+ * body-sha256: 6194b931698c8f4b661ea55fe491198c9d83fcb97f6537306320e18a10af6a16
  */
 #ifndef PREDATOR_PREY_H
 #define PREDATOR_PREY_H
@@ -49,15 +49,16 @@ typedef enum {
 } predator_prey_status;
 
 /* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
-   fitted to the last 96 values. They affect speed only. */
+   fitted to the last 95 values. They affect speed only. */
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
+    int terms;    /* how many of them the recurrence uses */
     int fits;     /* how often weight has been fitted */
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */
     int patience; /* how many of those before the recurrence is fitted again */
-    double past[192][predator_prey_DIM]; /* values, the latest last */
+    double past[190][predator_prey_DIM]; /* values, the latest last */
     double weight[32][predator_prey_DIM][8]; /* of past values, the latest first, for the next values */
 } predator_prey_memory;
 

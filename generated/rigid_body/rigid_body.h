@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 60e8f555e890895cf44b7d83524728479bb7e84ea16591d8c6c3952911ac6682
+ * body-sha256: a08a616d68bf69dc1b5985f20878ae8fb77e9167a5bf4b52db96c9d33334fcd5
  */
 #ifndef RIGID_BODY_H
 #define RIGID_BODY_H
@@ -49,15 +49,16 @@ typedef enum {
 } rigid_body_status;
 
 /* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
-   fitted to the last 96 values. They affect speed only. */
+   fitted to the last 95 values. They affect speed only. */
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
+    int terms;    /* how many of them the recurrence uses */
     int fits;     /* how often weight has been fitted */
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */
     int patience; /* how many of those before the recurrence is fitted again */
-    double past[192][rigid_body_DIM]; /* values, the latest last */
+    double past[190][rigid_body_DIM]; /* values, the latest last */
     double weight[32][rigid_body_DIM][8]; /* of past values, the latest first, for the next values */
 } rigid_body_memory;
 

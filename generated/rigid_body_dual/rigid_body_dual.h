@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 0c85476568fa2d2e9d9fafd688fe78f7c5514d45ba741a29728bdb1470311bfb
+ * body-sha256: 7f5abc0c26cfc302be860a64b3b9e9787ee5ad24149e30619acf848c0ed20dde
  */
 #ifndef RIGID_BODY_DUAL_H
 #define RIGID_BODY_DUAL_H
@@ -49,15 +49,16 @@ typedef enum {
 } rigid_body_dual_status;
 
 /* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
-   fitted to the last 96 values. They affect speed only. */
+   fitted to the last 95 values. They affect speed only. */
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
+    int terms;    /* how many of them the recurrence uses */
     int fits;     /* how often weight has been fitted */
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */
     int patience; /* how many of those before the recurrence is fitted again */
-    double past[192][rigid_body_dual_DIM]; /* values, the latest last */
+    double past[190][rigid_body_dual_DIM]; /* values, the latest last */
     double weight[32][rigid_body_dual_DIM][8]; /* of past values, the latest first, for the next values */
 } rigid_body_dual_memory;
 

@@ -13,7 +13,7 @@
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: e01a6b7803242a4a13af1120f91b5e99d74932bdd91b767a2aacddbb3ee334f7
+# body-sha256: 455cba51265f38168f94a2b6681aaa212733b402bcc7a8f8eb09a528f1ff9090
 import numpy as np
 
 VERSION = "0.1.0"
@@ -355,6 +355,39 @@ def _advance(coef, x, carry, memory):
     return following, rest, (y - x, memory[0] if memory[0].any() else y - x), status
 
 
+def _line(error_of, gauge, c, width):
+    """The error where one multiple varies, of centre + (j - 3) width for j = 0 ... 6, as forward differences (7, members).
+
+    S_3 is cubic in H, so these are those of a polynomial of degree six. Also their size, before.
+    """
+    moved, errors = gauge.copy(), []
+    for j in range(7):
+        moved[:, c] = gauge[:, c] + (j - 3) * width
+        errors.append(error_of(moved))
+    return np.array([np.diff(errors, k, axis=0)[0] for k in range(7)]), sum(errors)
+
+
+def _least_on_line(difference, size):
+    """Where that polynomial is least, in units of width: the best t on grids, each finer than the one before."""
+
+    def value(t):
+        error = difference[6]
+        for k in range(5, -1, -1):
+            error = difference[k] + (t + 3.0 - k) / (k + 1) * error
+        return error
+
+    best = np.zeros_like(size)
+    least = value(best)
+    for reach, mesh in ((24, 1 / 8), (8, 1 / 64), (8, 1 / 512)):
+        centre = best
+        for j in range(-reach, reach + 1):
+            t = centre + j * mesh
+            error = value(t)
+            better = error < least - 1e-12 * size  # close calls are not decided by rounding
+            least, best = np.where(better, error, least), np.where(better, t, best)
+    return best
+
+
 def _samples(parameters, x, count=32):
     """A short piece of each trajectory, by a Runge-Kutta method with steps of a fixed change."""
     speed = np.abs(_vector_field(parameters, x)).sum(axis=-1) + np.finfo(float).tiny
@@ -370,7 +403,7 @@ def _samples(parameters, x, count=32):
 def _choose_gauge(parameters, x):
     """The lambda that minimise the leading error along a short piece of each trajectory: (members, number of them).
 
-    A search on grids, from the least-squares solution of grad H = sum of lambda grad C; zero where that gives
+    One after the other, from the least-squares solution of grad H = sum of lambda grad C; zero where that gives
     nothing finite.
     """
     points = _samples(parameters, x)
@@ -381,18 +414,13 @@ def _choose_gauge(parameters, x):
 
     norms = np.where(sums[:, 2::2] > 0, sums[:, 2::2], np.inf)
     gauge, width = sums[:, 1::2] / norms, np.sqrt(sums[:, :1] / norms)
-    least = error_of(gauge)
-    for reach, mesh in ((24, 1 / 8), (24, 1 / 8), (8, 1 / 64), (8, 1 / 64), (8, 1 / 512), (8, 1 / 512)):
+    for _ in range(4):
+        before = gauge.copy()
         for c in range(gauge.shape[1]):
-            centre, best = gauge[:, c].copy(), gauge[:, c].copy()
-            for j in range(-reach, reach + 1):
-                gauge[:, c] = centre + j * mesh * width[:, c]
-                error = error_of(gauge)
-                # Close calls are not decided by rounding.
-                better = error < least * (1.0 - 1e-9)
-                least, best = np.where(better, error, least), np.where(better, gauge[:, c], best)
-            gauge[:, c] = best
-    return np.where(np.isfinite(least)[:, np.newaxis], gauge, 0.0)
+            gauge[:, c] += _least_on_line(*_line(error_of, gauge, c, width[:, c])) * width[:, c]
+        if np.array_equal(before, gauge, equal_nan=True):
+            break
+    return np.where(np.isfinite(error_of(gauge))[:, np.newaxis], gauge, 0.0)
 
 
 def _guide(parameters, gauge, x):

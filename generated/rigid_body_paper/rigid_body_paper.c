@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: fbf383c9070048895cbf3a444262249595cba79feed9b50ad5c36204e3a94d18
+ * body-sha256: f9c4fa37d9c87ce87abc2d595fb1f6c5b7caee2a9cd8b74e1da8b273a248f3ef
  */
 #include "rigid_body_paper.h"
 
@@ -286,7 +286,7 @@ static int rigid_body_paper_predict(const rigid_body_paper_memory *memory, doubl
     double odd[3] = { 0.0 }, binomial = -1.0;
     memset(value, 0, 3 * sizeof value[0]);
     if (memory->fitting) {
-        for (int k = 0; k < 32; k += 2)
+        for (int k = 0; k < memory->terms; k += 2)
             for (int i = 0; i < 3; ++i) {
                 value[i] += memory->weight[k][i][0] * memory->past[last - k][i];
                 odd[i] += memory->weight[k + 1][i][0] * memory->past[last - 1 - k][i];
@@ -327,46 +327,75 @@ static void rigid_body_paper_judge(rigid_body_paper_memory *memory, const double
     if (memory->order == 0) memory->order = 1;
 }
 
-/* Fit the recurrences value[m + l] = sum of weight[k][..][l] * value[m - 1 - k], l = 0 ... 8 - 1, to the history,
-   component by component: ridge least squares by modified Gram-Schmidt, the ridge at the level of rounding. The last
-   8 columns of q are the right-hand sides. */
-static void rigid_body_paper_train(rigid_body_paper_memory *memory, int component)
+/* Make eight columns orthogonal to one, by the multiples of it that are put into r. Where that one is among the eight, those
+   up to it stay as they are, and inverse becomes one over its squared length. The number of rows is even. */
+static void rigid_body_paper_project(int rows, double (*one)[8], int column, double *inverse, double (*eight)[8], double r[8])
 {
-    enum { WINDOW = 32, AHEAD = 8, ROWS = 96 - WINDOW - AHEAD + 1 };
-    double q[ROWS + WINDOW][WINDOW + AHEAD], r[WINDOW][WINDOW + AHEAD], largest = 0.0;
+    double even[8] = { 0.0 }, odd[8] = { 0.0 };
+    for (int i = 0; i < rows; i += 2) {
+        const double entry = one[i][column], next = one[i + 1][column];
+        for (int l = 0; l < 8; ++l) even[l] += entry * eight[i][l];
+        for (int l = 0; l < 8; ++l) odd[l] += next * eight[i + 1][l];
+    }
+    for (int l = 0; l < 8; ++l) even[l] += odd[l];
+    if (one == eight) {
+        *inverse = even[column] > 0.0 ? 1.0 / even[column] : 0.0;
+        memset(even, 0, ((size_t)column + 1) * sizeof even[0]);
+    }
+    for (int l = 0; l < 8; ++l) r[l] = even[l] *= *inverse;
+    for (int i = 0; i < rows; ++i) {
+        const double entry = one[i][column];
+        for (int l = 0; l < 8; ++l) eight[i][l] -= entry * even[l];
+    }
+}
+
+/* Fit the recurrences value[m + l] = sum of weight[k][..][l] * value[m - 1 - k], l = 0 ... 8 - 1, to the history of
+   a component: ridge least squares by modified Gram-Schmidt, the ridge at the level of rounding. Columns are taken in by
+   eights, until they leave next to nothing of the right-hand sides. How many past values are used. */
+static int rigid_body_paper_train(rigid_body_paper_memory *memory, int component)
+{
+    enum { AHEAD = 8, WINDOW = 32, ROWS = 56 };
+    double q[WINDOW / 8][ROWS + WINDOW][8], r[WINDOW / 8][WINDOW][8], inverse[WINDOW]; /* eight columns in each part */
+    double right[ROWS + WINDOW][8], weight[WINDOW][8], value[95], largest = 0.0, left = HUGE_VAL;
+    int terms = 0;
     memset(q, 0, sizeof q);
-    memset(r, 0, sizeof r);
-    for (int i = 0; i < ROWS; ++i) {
-        for (int j = 0; j < WINDOW + AHEAD; ++j) {
-            const int place = j < WINDOW ? WINDOW - 1 - j : j;
-            q[i][j] = memory->past[memory->count - 96 + i + place][component];
-        }
-        if (fabs(q[i][0]) > largest) largest = fabs(q[i][0]);
+    memset(right, 0, sizeof right);
+    memset(weight, 0, sizeof weight);
+    for (int i = 0; i < 95; ++i) {
+        value[i] = memory->past[memory->count - 95 + i][component];
+        if (fabs(value[i]) > largest) largest = fabs(value[i]);
     }
-    for (int k = 0; k < WINDOW; ++k) q[ROWS + k][k] = 1e-13 * largest;
-    for (int k = 0; k < WINDOW; ++k) {
-        const int rows = ROWS + k + 1; /* further rows of the ridge are still zero in this column */
-        for (int i = 0; i < rows; ++i)
-            for (int j = k; j < WINDOW + AHEAD; ++j) r[k][j] += q[i][k] * q[i][j];
-        const double scale = r[k][k] > 0.0 ? 1.0 / r[k][k] : 0.0;
-        for (int j = k + 1; j < WINDOW + AHEAD; ++j) r[k][j] *= scale;
-        for (int i = 0; i < rows; ++i)
-            for (int j = k + 1; j < WINDOW + AHEAD; ++j) q[i][j] -= q[i][k] * r[k][j];
-    }
-    for (int l = 0; l < AHEAD; ++l)
-        for (int k = WINDOW - 1; k >= 0; --k) {
-            double sum = r[k][WINDOW + l];
-            for (int j = k + 1; j < WINDOW; ++j) sum -= r[k][j] * memory->weight[j][component][l];
-            memory->weight[k][component][l] = sum;
+    for (int i = 0; i < ROWS; ++i)
+        for (int l = 0; l < AHEAD; ++l) right[i][l] = value[i + WINDOW + l];
+    while (terms < WINDOW && left > 1e-12 * largest) {
+        const int part = terms / 8, rows = ROWS + terms + 8; /* further rows of the ridge are zero in these columns */
+        for (int i = 0; i < ROWS; ++i)
+            for (int l = 0; l < 8; ++l) q[part][i][l] = value[i + WINDOW - 1 - terms - l];
+        for (int l = 0; l < 8; ++l) q[part][ROWS + terms + l][l] = 1e-13 * largest;
+        for (int k = 0; k < terms; ++k) rigid_body_paper_project(rows, q[k / 8], k % 8, &inverse[k], q[part], r[part][k]);
+        for (int l = 0; l < 8; ++l, ++terms) {
+            rigid_body_paper_project(rows, q[part], l, &inverse[terms], q[part], r[part][terms]);
+            rigid_body_paper_project(rows, q[part], l, &inverse[terms], right, weight[terms]);
         }
+        double sum[8] = { 0.0 };
+        for (int i = 0; i < ROWS; ++i)
+            for (int l = 0; l < 8; ++l) sum[l] += fabs(right[i][l]);
+        left = 0.0;
+        for (int l = 0; l < 8; ++l) left += sum[l] / ROWS;
+    }
+    for (int k = terms - 1; k >= 0; --k)
+        for (int j = k + 1; j < terms; ++j)
+            for (int l = 0; l < 8; ++l) weight[k][l] -= r[j / 8][k][j % 8] * weight[j][l];
+    for (int k = 0; k < WINDOW; ++k) memcpy(memory->weight[k][component], weight[k], AHEAD * sizeof(double));
+    return terms;
 }
 
 /* Drop what is old, if so many values would not fit into the history. */
 static void rigid_body_paper_make_room(rigid_body_paper_memory *memory, int values)
 {
-    if (memory->count + values <= 192) return;
-    memmove(memory->past, memory->past + memory->count - 96, 96 * sizeof memory->past[0]);
-    memory->count = 96;
+    if (memory->count + values <= 190) return;
+    memmove(memory->past, memory->past + memory->count - 95, 95 * sizeof memory->past[0]);
+    memory->count = 95;
 }
 
 /* Add a value to the history. */
@@ -379,11 +408,15 @@ static void rigid_body_paper_record(rigid_body_paper_memory *memory, const doubl
 /* Fit the recurrence to the last values; with every time, wait longer before it is done again. */
 static void rigid_body_paper_fit(rigid_body_paper_memory *memory)
 {
-    for (int i = 0; i < 3; ++i) rigid_body_paper_train(memory, i);
+    memory->terms = 0;
+    for (int i = 0; i < 3; ++i) {
+        const int terms = rigid_body_paper_train(memory, i);
+        if (terms > memory->terms) memory->terms = terms;
+    }
     memory->fitting = 1;
     ++memory->fits;
     memory->slow = 0;
-    memory->patience = memory->patience < 10000 ? 2 * memory->patience + 1000 : 20000;
+    memory->patience = memory->patience < 10000 ? 2 * memory->patience + 150 : 20000;
 }
 
 /* Take in the solved value: what took one iteration needs no better guess. */
@@ -392,7 +425,7 @@ static void rigid_body_paper_remember(rigid_body_paper_memory *memory, const dou
     if (iterations > 1) rigid_body_paper_judge(memory, value);
     rigid_body_paper_record(memory, value);
     memory->slow = iterations > 1 ? memory->slow + 1 : 0;
-    if (memory->slow > memory->patience && memory->count >= 96) rigid_body_paper_fit(memory);
+    if (memory->slow > memory->patience && memory->count >= 95) rigid_body_paper_fit(memory);
 }
 
 /* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last
@@ -506,7 +539,7 @@ static rigid_body_paper_status rigid_body_paper_set_step(rigid_body_paper_solver
     for (int stage = 0; stage < 1; ++stage)
         rigid_body_paper_prepare(&s->params, rigid_body_paper_fractions[stage] * h, s->coef[stage]);
     memset(s->memory, 0, sizeof s->memory);
-    for (int stage = 0; stage < 1; ++stage) s->memory[stage].patience = 1000;
+    for (int stage = 0; stage < 1; ++stage) s->memory[stage].patience = 150;
     s->pause = 16;
     s->setback = s->foreseeing = 0;
     s->doubt = s->retry = 0;
@@ -564,46 +597,46 @@ typedef struct {
 /* rigid_body_paper_phi0 for the loops over lanes: no branches. Infinite beyond |s| = 4.0. */
 static inline double rigid_body_paper_phi0_lane(double s)
 {
-    double sum = 1.455172475614865e-27;
-    sum = sum * s + 5.744790668872202e-26;
-    sum = sum * s + 2.267952452337683e-24;
-    sum = sum * s + 8.953517427037546e-23;
-    sum = sum * s + 3.534707039629467e-21;
-    sum = sum * s + 1.3954464685812522e-19;
-    sum = sum * s + 5.5090028283602295e-18;
-    sum = sum * s + 2.174868698558062e-16;
-    sum = sum * s + 8.586062056277845e-15;
-    sum = sum * s + 3.3896802963225827e-13;
-    sum = sum * s + 1.3382536530684679e-11;
-    sum = sum * s + 5.284190138687493e-10;
-    sum = sum * s + 2.08767569878681e-08;
-    sum = sum * s + 8.267195767195768e-07;
-    sum = sum * s + 3.306878306878307e-05;
-    sum = sum * s + 0.001388888888888889;
-    sum = sum * s + 0.08333333333333333;
+    const double ss = s * s;
+    double sum = 1.455172475614865e-27, other = 5.744790668872202e-26; /* every second term each, as neither then is waited for */
+    sum = sum * ss + 2.267952452337683e-24;
+    other = other * ss + 8.953517427037546e-23;
+    sum = sum * ss + 3.534707039629467e-21;
+    other = other * ss + 1.3954464685812522e-19;
+    sum = sum * ss + 5.5090028283602295e-18;
+    other = other * ss + 2.174868698558062e-16;
+    sum = sum * ss + 8.586062056277845e-15;
+    other = other * ss + 3.3896802963225827e-13;
+    sum = sum * ss + 1.3382536530684679e-11;
+    other = other * ss + 5.284190138687493e-10;
+    sum = sum * ss + 2.08767569878681e-08;
+    other = other * ss + 8.267195767195768e-07;
+    sum = sum * ss + 3.306878306878307e-05;
+    other = other * ss + 0.001388888888888889;
+    sum = (sum * s + other) * s + 0.08333333333333333;
     return sum + (fabs(s) <= 4.0 ? 0.0 : HUGE_VAL);
 }
 
 /* rigid_body_paper_phi1 for the loops over lanes: no branches. Infinite beyond |s| = 4.0. */
 static inline double rigid_body_paper_phi1_lane(double s)
 {
-    double sum = 6.266191399131027e-28;
-    sum = sum * s + 2.328275960983784e-26;
-    sum = sum * s + 8.617186003308303e-25;
-    sum = sum * s + 3.1751334332727565e-23;
-    sum = sum * s + 1.163957265514881e-21;
-    sum = sum * s + 4.241648447555361e-20;
-    sum = sum * s + 1.5349911154393775e-18;
-    sum = sum * s + 5.5090028283602297e-17;
-    sum = sum * s + 1.9573818287022555e-15;
-    sum = sum * s + 6.868849645022276e-14;
-    sum = sum * s + 2.372776207425808e-12;
-    sum = sum * s + 8.029521918410807e-11;
-    sum = sum * s + 2.6420950693437467e-09;
-    sum = sum * s + 8.35070279514724e-08;
-    sum = sum * s + 2.48015873015873e-06;
-    sum = sum * s + 6.613756613756614e-05;
-    sum = sum * s + 0.001388888888888889;
+    const double ss = s * s;
+    double sum = 6.266191399131027e-28, other = 2.328275960983784e-26; /* every second term each, as neither then is waited for */
+    sum = sum * ss + 8.617186003308303e-25;
+    other = other * ss + 3.1751334332727565e-23;
+    sum = sum * ss + 1.163957265514881e-21;
+    other = other * ss + 4.241648447555361e-20;
+    sum = sum * ss + 1.5349911154393775e-18;
+    other = other * ss + 5.5090028283602297e-17;
+    sum = sum * ss + 1.9573818287022555e-15;
+    other = other * ss + 6.868849645022276e-14;
+    sum = sum * ss + 2.372776207425808e-12;
+    other = other * ss + 8.029521918410807e-11;
+    sum = sum * ss + 2.6420950693437467e-09;
+    other = other * ss + 8.35070279514724e-08;
+    sum = sum * ss + 2.48015873015873e-06;
+    other = other * ss + 6.613756613756614e-05;
+    sum = (sum * s + other) * s + 0.001388888888888889;
     return sum + (fabs(s) <= 4.0 ? 0.0 : HUGE_VAL);
 }
 
@@ -890,7 +923,7 @@ static void rigid_body_paper_refresh(const rigid_body_paper_solver *s, rigid_bod
         table->fits[stage] = s->memory[stage].fits;
         for (int k = 0; k < 3; ++k)
             for (int lane = 0; lane < rigid_body_paper_LANES; ++lane) table->coef[stage][k][lane] = s->coef[stage][k];
-        memcpy(table->weight[stage], s->memory[stage].weight, sizeof table->weight[stage]);
+        memcpy(table->weight[stage], s->memory[stage].weight, (size_t)s->memory[stage].terms * sizeof table->weight[0][0]);
     }
 }
 
@@ -900,15 +933,16 @@ static void rigid_body_paper_foresee(const rigid_body_paper_memory *memory, rigi
 {
     const int last = memory->count - 1;
     for (int i = 0; i < 3; ++i) {
-        rigid_body_paper_EACH_LANE
-        for (int lane = 0; lane < rigid_body_paper_LANES; ++lane) {
-            double even = 0.0, odd = 0.0;
-            for (int k = 0; k < 32; k += 2) {
-                even += weight[k][i][lane] * memory->past[last - k][i];
-                odd += weight[k + 1][i][lane] * memory->past[last - 1 - k][i];
-            }
-            y[i][lane] = even + odd;
+        rigid_body_paper_lanes even = { 0.0 }, odd = { 0.0 };
+        for (int k = 0; k < memory->terms; k += 2) {
+            const double past = memory->past[last - k][i], earlier = memory->past[last - 1 - k][i];
+            rigid_body_paper_EACH_LANE
+            for (int lane = 0; lane < rigid_body_paper_LANES; ++lane) even[lane] += weight[k][i][lane] * past;
+            rigid_body_paper_EACH_LANE
+            for (int lane = 0; lane < rigid_body_paper_LANES; ++lane) odd[lane] += weight[k + 1][i][lane] * earlier;
         }
+        rigid_body_paper_EACH_LANE
+        for (int lane = 0; lane < rigid_body_paper_LANES; ++lane) y[i][lane] = even[lane] + odd[lane];
     }
 }
 
@@ -1007,11 +1041,11 @@ static int rigid_body_paper_block(rigid_body_paper_solver *s, rigid_body_paper_t
 static void rigid_body_paper_choose_guess(rigid_body_paper_solver *s, size_t steps)
 {
     for (int stage = 0; stage < 1; ++stage)
-        if (s->memory[stage].count < 96) {
+        if (s->memory[stage].count < 95) {
             s->foreseeing = 0;
             return;
         }
-    if (s->foreseeing || (steps < 4000 && s->steps < 1000) || s->steps < s->retry) return;
+    if (s->foreseeing || (steps < 600 && s->steps < 150) || s->steps < s->retry) return;
     for (int stage = 0; stage < 1; ++stage) rigid_body_paper_fit(&s->memory[stage]);
     s->foreseeing = 1;
     s->pause = rigid_body_paper_LANES;
@@ -1031,7 +1065,7 @@ static void rigid_body_paper_learn_from(rigid_body_paper_solver *s, int passes)
         s->passes = passes > 0 ? passes : INT_MAX;
     } else if (passes > s->passes || s->setback > 5 * rigid_body_paper_LANES) {
         s->foreseeing = s->setback = s->pause = 0;
-        s->doubt = 2 * s->doubt + 4000;
+        s->doubt = 2 * s->doubt + 600;
         s->retry = s->steps + s->doubt;
     }
 }
@@ -1071,11 +1105,12 @@ rigid_body_paper_status rigid_body_paper_integrate(rigid_body_paper_solver *s, d
 /* Members of an ensemble, each in its lane. */
 typedef struct {
     rigid_body_paper_lanes x[3], carry[3], coef[1][3];
-    rigid_body_paper_lanes past[1][96][3]; /* solved values, in a ring */
+    rigid_body_paper_lanes past[1][95][3]; /* solved values, in a ring */
     rigid_body_paper_lanes weight[1][32][3]; /* of past values, the latest first, for the next */
     int latest;     /* the row of the latest values */
     int count;      /* rows in use */
     int order[1];   /* how many of them the extrapolation uses */
+    int terms[1];   /* how many of them the recurrences use */
     int fits;       /* how often recurrences have been fitted */
     int fitting[1]; /* whether they are the better guess */
     int slow;       /* how many of the last steps took more than one iteration */
@@ -1087,14 +1122,14 @@ typedef struct {
 /* The past values of a stage, the latest for k = 0. */
 static rigid_body_paper_lanes *rigid_body_paper_group_past(rigid_body_paper_group *group, int stage, int k)
 {
-    return group->past[stage][(group->latest + k) % 96];
+    return group->past[stage][(group->latest + k) % 95];
 }
 
 /* Guess the values of a stage by the recurrences of the members. */
 static void rigid_body_paper_group_foresee(rigid_body_paper_group *group, int stage, rigid_body_paper_lanes y[restrict 3])
 {
     memset(y, 0, 3 * sizeof y[0]);
-    for (int k = 0; k < 32; ++k) {
+    for (int k = 0; k < group->terms[stage]; ++k) {
         rigid_body_paper_lanes *past = rigid_body_paper_group_past(group, stage, k), *weight = group->weight[stage][k];
         for (int i = 0; i < 3; ++i) {
             rigid_body_paper_EACH_LANE
@@ -1166,21 +1201,22 @@ static void rigid_body_paper_group_fit(rigid_body_paper_group *group)
 {
     rigid_body_paper_memory memory;
     const int helped = group->fits == 0 || group->fitting[0];
-    memory.count = 96;
-    for (int stage = 0; stage < 1; ++stage)
-        for (int lane = 0; lane < rigid_body_paper_LANES; ++lane) {
-            for (int i = 0; i < 3; ++i) {
-                for (int k = 0; k < 96; ++k)
-                    memory.past[96 - 1 - k][i] = rigid_body_paper_group_past(group, stage, k)[i][lane];
-                if (group->active[lane]) rigid_body_paper_train(&memory, i);
-                for (int k = 0; k < 32 && group->active[lane]; ++k)
-                    group->weight[stage][k][i][lane] = memory.weight[k][i][0];
+    memory.count = 95;
+    for (int stage = 0; stage < 1; ++stage) {
+        group->terms[stage] = 0;
+        for (int lane = 0; lane < rigid_body_paper_LANES; ++lane)
+            for (int i = 0; i < 3 && group->active[lane]; ++i) {
+                for (int k = 0; k < 95; ++k)
+                    memory.past[95 - 1 - k][i] = rigid_body_paper_group_past(group, stage, k)[i][lane];
+                const int terms = rigid_body_paper_train(&memory, i);
+                if (terms > group->terms[stage]) group->terms[stage] = terms;
+                for (int k = 0; k < 32; ++k) group->weight[stage][k][i][lane] = memory.weight[k][i][0];
             }
-            group->fitting[stage] = 1;
-        }
+        group->fitting[stage] = 1;
+    }
     ++group->fits;
     group->slow = 0;
-    group->patience = helped && group->patience < 10000 ? 2 * group->patience + 1000 : 100 * 1000;
+    group->patience = helped && group->patience < 10000 ? 2 * group->patience + 150 : 100 * 150;
 }
 
 /* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group.
@@ -1268,7 +1304,7 @@ static int rigid_body_paper_group_step(rigid_body_paper_group *group, size_t rem
 {
     rigid_body_paper_lanes x[3], carry[3];
     rigid_body_paper_model model;
-    const int next = (group->latest + 96 - 1) % 96;
+    const int next = (group->latest + 95 - 1) % 95;
     int active = 0, most = 0;
     memcpy(x, group->x, sizeof x);
     memcpy(carry, group->carry, sizeof carry);
@@ -1280,9 +1316,9 @@ static int rigid_body_paper_group_step(rigid_body_paper_group *group, size_t rem
         memcpy(group->past[stage][next], model.y, sizeof model.y);
     }
     group->latest = next;
-    if (group->count < 96) ++group->count;
+    if (group->count < 95) ++group->count;
     group->slow = most > 1 ? group->slow + 1 : 0;
-    if (group->slow > group->patience && group->count == 96 && remaining >= 4000)
+    if (group->slow > group->patience && group->count == 95 && remaining >= 600)
         rigid_body_paper_group_fit(group);
     for (int lane = 0; lane < rigid_body_paper_LANES; ++lane) {
         for (int i = 0; i < 3; ++i)

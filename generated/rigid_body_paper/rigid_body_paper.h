@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 098062b4d35ef3e3bb00c78e731d9188714a2b1ed0a11d15dc0b36a9954f8791
+ * body-sha256: 7cc1d1ca4f81da29c3d060a1107b9291d9ab3eaecae14f2fea3d882a37c85c9c
  */
 #ifndef RIGID_BODY_PAPER_H
 #define RIGID_BODY_PAPER_H
@@ -48,15 +48,16 @@ typedef enum {
 } rigid_body_paper_status;
 
 /* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
-   fitted to the last 96 values. They affect speed only. */
+   fitted to the last 95 values. They affect speed only. */
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
+    int terms;    /* how many of them the recurrence uses */
     int fits;     /* how often weight has been fitted */
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */
     int patience; /* how many of those before the recurrence is fitted again */
-    double past[192][rigid_body_paper_DIM]; /* values, the latest last */
+    double past[190][rigid_body_paper_DIM]; /* values, the latest last */
     double weight[32][rigid_body_paper_DIM][8]; /* of past values, the latest first, for the next values */
 } rigid_body_paper_memory;
 

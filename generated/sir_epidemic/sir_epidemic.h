@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 814ef90a7a420cbaa939fe5a33715adfda59f5ba2b381be3502825cb917fef1c
+ * body-sha256: 9304d9b9bb906157e406153a22a0a461e4954956d43b4e033f20ff90842ff03d
  */
 #ifndef SIR_EPIDEMIC_H
 #define SIR_EPIDEMIC_H
@@ -51,6 +51,7 @@ typedef enum {
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
+    int terms;    /* how many of them the recurrence uses */
     int fits;     /* how often weight has been fitted */
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */

@@ -12,7 +12,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 6f74f5764dbed91c6b3f1f4ebaeb16138f6e63f32a393bc0e3d9e941b3e764f6
+ * body-sha256: 0ed6acbc42dd342ca2b54cac5e826dbb6d5a7b4509b538baa7cb90da5f263fcd
  */
 #ifndef SIR_FINAL_SIZE_H
 #define SIR_FINAL_SIZE_H
@@ -50,6 +50,7 @@ typedef enum {
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
+    int terms;    /* how many of them the recurrence uses */
     int fits;     /* how often weight has been fitted */
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */

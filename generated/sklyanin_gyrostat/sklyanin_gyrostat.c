@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 20b58537598e6ddc9a9d31d540521faf7a7ee8b0d043e6d088a296e33e593513
+ * body-sha256: bd99cfb15337e8584e06d32ce8fe33ae0c46dab054ffafb0c90123ff4fcfe4ed
  */
 #include "sklyanin_gyrostat.h"
 
@@ -242,7 +242,7 @@ static int sklyanin_gyrostat_predict(const sklyanin_gyrostat_memory *memory, dou
     double odd[4] = { 0.0 }, binomial = -1.0;
     memset(value, 0, 4 * sizeof value[0]);
     if (memory->fitting) {
-        for (int k = 0; k < 32; k += 2)
+        for (int k = 0; k < memory->terms; k += 2)
             for (int i = 0; i < 4; ++i) {
                 value[i] += memory->weight[k][i][0] * memory->past[last - k][i];
                 odd[i] += memory->weight[k + 1][i][0] * memory->past[last - 1 - k][i];
@@ -283,38 +283,67 @@ static void sklyanin_gyrostat_judge(sklyanin_gyrostat_memory *memory, const doub
     if (memory->order == 0) memory->order = 1;
 }
 
-/* Fit the recurrences value[m + l] = sum of weight[k][..][l] * value[m - 1 - k], l = 0 ... 1 - 1, to the history,
-   component by component: ridge least squares by modified Gram-Schmidt, the ridge at the level of rounding. The last
-   1 columns of q are the right-hand sides. */
-static void sklyanin_gyrostat_train(sklyanin_gyrostat_memory *memory, int component)
+/* Make eight columns orthogonal to one, by the multiples of it that are put into r. Where that one is among the eight, those
+   up to it stay as they are, and inverse becomes one over its squared length. The number of rows is even. */
+static void sklyanin_gyrostat_project(int rows, double (*one)[8], int column, double *inverse, double (*eight)[8], double r[8])
 {
-    enum { WINDOW = 32, AHEAD = 1, ROWS = 96 - WINDOW - AHEAD + 1 };
-    double q[ROWS + WINDOW][WINDOW + AHEAD], r[WINDOW][WINDOW + AHEAD], largest = 0.0;
+    double even[8] = { 0.0 }, odd[8] = { 0.0 };
+    for (int i = 0; i < rows; i += 2) {
+        const double entry = one[i][column], next = one[i + 1][column];
+        for (int l = 0; l < 8; ++l) even[l] += entry * eight[i][l];
+        for (int l = 0; l < 8; ++l) odd[l] += next * eight[i + 1][l];
+    }
+    for (int l = 0; l < 8; ++l) even[l] += odd[l];
+    if (one == eight) {
+        *inverse = even[column] > 0.0 ? 1.0 / even[column] : 0.0;
+        memset(even, 0, ((size_t)column + 1) * sizeof even[0]);
+    }
+    for (int l = 0; l < 8; ++l) r[l] = even[l] *= *inverse;
+    for (int i = 0; i < rows; ++i) {
+        const double entry = one[i][column];
+        for (int l = 0; l < 8; ++l) eight[i][l] -= entry * even[l];
+    }
+}
+
+/* Fit the recurrences value[m + l] = sum of weight[k][..][l] * value[m - 1 - k], l = 0 ... 1 - 1, to the history of
+   a component: ridge least squares by modified Gram-Schmidt, the ridge at the level of rounding. Columns are taken in by
+   eights, until they leave next to nothing of the right-hand sides. How many past values are used. */
+static int sklyanin_gyrostat_train(sklyanin_gyrostat_memory *memory, int component)
+{
+    enum { AHEAD = 1, WINDOW = 32, ROWS = 64 };
+    double q[WINDOW / 8][ROWS + WINDOW][8], r[WINDOW / 8][WINDOW][8], inverse[WINDOW]; /* eight columns in each part */
+    double right[ROWS + WINDOW][8], weight[WINDOW][8], value[96], largest = 0.0, left = HUGE_VAL;
+    int terms = 0;
     memset(q, 0, sizeof q);
-    memset(r, 0, sizeof r);
-    for (int i = 0; i < ROWS; ++i) {
-        for (int j = 0; j < WINDOW + AHEAD; ++j) {
-            const int place = j < WINDOW ? WINDOW - 1 - j : j;
-            q[i][j] = memory->past[memory->count - 96 + i + place][component];
-        }
-        if (fabs(q[i][0]) > largest) largest = fabs(q[i][0]);
+    memset(right, 0, sizeof right);
+    memset(weight, 0, sizeof weight);
+    for (int i = 0; i < 96; ++i) {
+        value[i] = memory->past[memory->count - 96 + i][component];
+        if (fabs(value[i]) > largest) largest = fabs(value[i]);
     }
-    for (int k = 0; k < WINDOW; ++k) q[ROWS + k][k] = 1e-13 * largest;
-    for (int k = 0; k < WINDOW; ++k) {
-        const int rows = ROWS + k + 1; /* further rows of the ridge are still zero in this column */
-        for (int i = 0; i < rows; ++i)
-            for (int j = k; j < WINDOW + AHEAD; ++j) r[k][j] += q[i][k] * q[i][j];
-        const double scale = r[k][k] > 0.0 ? 1.0 / r[k][k] : 0.0;
-        for (int j = k + 1; j < WINDOW + AHEAD; ++j) r[k][j] *= scale;
-        for (int i = 0; i < rows; ++i)
-            for (int j = k + 1; j < WINDOW + AHEAD; ++j) q[i][j] -= q[i][k] * r[k][j];
-    }
-    for (int l = 0; l < AHEAD; ++l)
-        for (int k = WINDOW - 1; k >= 0; --k) {
-            double sum = r[k][WINDOW + l];
-            for (int j = k + 1; j < WINDOW; ++j) sum -= r[k][j] * memory->weight[j][component][l];
-            memory->weight[k][component][l] = sum;
+    for (int i = 0; i < ROWS; ++i)
+        for (int l = 0; l < AHEAD; ++l) right[i][l] = value[i + WINDOW + l];
+    while (terms < WINDOW && left > 1e-12 * largest) {
+        const int part = terms / 8, rows = ROWS + terms + 8; /* further rows of the ridge are zero in these columns */
+        for (int i = 0; i < ROWS; ++i)
+            for (int l = 0; l < 8; ++l) q[part][i][l] = value[i + WINDOW - 1 - terms - l];
+        for (int l = 0; l < 8; ++l) q[part][ROWS + terms + l][l] = 1e-13 * largest;
+        for (int k = 0; k < terms; ++k) sklyanin_gyrostat_project(rows, q[k / 8], k % 8, &inverse[k], q[part], r[part][k]);
+        for (int l = 0; l < 8; ++l, ++terms) {
+            sklyanin_gyrostat_project(rows, q[part], l, &inverse[terms], q[part], r[part][terms]);
+            sklyanin_gyrostat_project(rows, q[part], l, &inverse[terms], right, weight[terms]);
         }
+        double sum[8] = { 0.0 };
+        for (int i = 0; i < ROWS; ++i)
+            for (int l = 0; l < 8; ++l) sum[l] += fabs(right[i][l]);
+        left = 0.0;
+        for (int l = 0; l < 8; ++l) left += sum[l] / ROWS;
+    }
+    for (int k = terms - 1; k >= 0; --k)
+        for (int j = k + 1; j < terms; ++j)
+            for (int l = 0; l < 8; ++l) weight[k][l] -= r[j / 8][k][j % 8] * weight[j][l];
+    for (int k = 0; k < WINDOW; ++k) memcpy(memory->weight[k][component], weight[k], AHEAD * sizeof(double));
+    return terms;
 }
 
 /* Drop what is old, if so many values would not fit into the history. */
@@ -335,11 +364,15 @@ static void sklyanin_gyrostat_record(sklyanin_gyrostat_memory *memory, const dou
 /* Fit the recurrence to the last values; with every time, wait longer before it is done again. */
 static void sklyanin_gyrostat_fit(sklyanin_gyrostat_memory *memory)
 {
-    for (int i = 0; i < 4; ++i) sklyanin_gyrostat_train(memory, i);
+    memory->terms = 0;
+    for (int i = 0; i < 4; ++i) {
+        const int terms = sklyanin_gyrostat_train(memory, i);
+        if (terms > memory->terms) memory->terms = terms;
+    }
     memory->fitting = 1;
     ++memory->fits;
     memory->slow = 0;
-    memory->patience = memory->patience < 10000 ? 2 * memory->patience + 1000 : 20000;
+    memory->patience = memory->patience < 10000 ? 2 * memory->patience + 150 : 20000;
 }
 
 /* Take in the solved value: what took one iteration needs no better guess. */
@@ -733,7 +766,51 @@ static void sklyanin_gyrostat_sample(const sklyanin_gyrostat_params *params, con
     }
 }
 
-/* The lambda that minimise the leading error along a short piece of the trajectory: a search on grids, from the
+/* The error where one multiple varies, of centre + (j - 3) width for j = 0 ... 6, as forward differences: S_3 is cubic in H,
+   so these are those of a polynomial of degree six. Their size, before. */
+static double sklyanin_gyrostat_gauge_line(const sklyanin_gyrostat_params *params, const double gauge[1], int c, double width,
+    double samples[][4], double difference[7])
+{
+    double moved[1], size = 0.0;
+    memcpy(moved, gauge, sizeof moved);
+    for (int j = 0; j < 7; ++j) {
+        moved[c] = gauge[c] + (j - 3) * width;
+        difference[j] = sklyanin_gyrostat_gauge_error(params, moved, samples);
+        size += difference[j];
+    }
+    for (int order = 1; order < 7; ++order)
+        for (int j = 6; j >= order; --j) difference[j] -= difference[j - 1];
+    return size;
+}
+
+/* Its value at centre + t width, by Newton's formula. */
+static double sklyanin_gyrostat_on_line(const double difference[7], double t)
+{
+    double error = difference[6];
+    for (int k = 5; k >= 0; --k) error = difference[k] + (t + 3.0 - k) / (k + 1) * error;
+    return error;
+}
+
+/* Where it is least: the best t on grids, each finer than the one before. */
+static double sklyanin_gyrostat_least_on_line(const double difference[7], double size)
+{
+    const double mesh[3] = { 0.125, 1.0 / 64.0, 1.0 / 512.0 };
+    double best = 0.0, least = sklyanin_gyrostat_on_line(difference, best);
+    for (int level = 0; level < 3; ++level) {
+        const int reach = level == 0 ? 24 : 8;
+        const double centre = best;
+        for (int j = -reach; j <= reach; ++j) {
+            const double t = centre + j * mesh[level], error = sklyanin_gyrostat_on_line(difference, t);
+            if (error < least - 1e-12 * size) { /* close calls are not decided by rounding */
+                least = error;
+                best = t;
+            }
+        }
+    }
+    return best;
+}
+
+/* The lambda that minimise the leading error along a short piece of the trajectory, one after the other, from the
    least-squares solution of grad H = sum of lambda grad C. Zero where that gives nothing finite. */
 static void sklyanin_gyrostat_choose_gauge(const sklyanin_gyrostat_params *params, const double x[4], double gauge[1])
 {
@@ -748,26 +825,17 @@ static void sklyanin_gyrostat_choose_gauge(const sklyanin_gyrostat_params *param
         gauge[c] = sums[1 + 2 * c] / norm;
         width[c] = sqrt(sums[0] / norm);
     }
-    double least = sklyanin_gyrostat_gauge_error(params, gauge, samples);
-    for (int level = 0; level < 6; ++level) {
-        const int reach = level < 2 ? 24 : 8;
-        const double mesh = level < 2 ? 0.125 : level < 4 ? 1.0 / 64.0 : 1.0 / 512.0;
+    for (int sweep = 0, moved = 1; sweep < 4 && moved; ++sweep) {
+        moved = 0;
         for (int c = 0; c < 1; ++c) {
-            const double centre = gauge[c];
-            double best = centre;
-            for (int j = -reach; j <= reach; ++j) {
-                gauge[c] = centre + j * mesh * width[c];
-                const double error = sklyanin_gyrostat_gauge_error(params, gauge, samples);
-                /* Close calls are not decided by rounding. */
-                if (error < least * (1.0 - 1e-9)) {
-                    least = error;
-                    best = gauge[c];
-                }
-            }
-            gauge[c] = best;
+            double difference[7];
+            const double size = sklyanin_gyrostat_gauge_line(params, gauge, c, width[c], samples, difference);
+            const double best = sklyanin_gyrostat_least_on_line(difference, size);
+            gauge[c] += best * width[c];
+            moved = moved || best != 0.0;
         }
     }
-    if (!isfinite(least))
+    if (!isfinite(sklyanin_gyrostat_gauge_error(params, gauge, samples)))
         for (int c = 0; c < 1; ++c) gauge[c] = 0.0;
 }
 
@@ -804,7 +872,7 @@ static sklyanin_gyrostat_status sklyanin_gyrostat_set_step(sklyanin_gyrostat_sol
     for (int stage = 0; stage < 1; ++stage)
         sklyanin_gyrostat_prepare(&s->params, s->gauge, sklyanin_gyrostat_fractions[stage] * h, s->coef[stage]);
     memset(s->memory, 0, sizeof s->memory);
-    for (int stage = 0; stage < 1; ++stage) s->memory[stage].patience = 1000;
+    for (int stage = 0; stage < 1; ++stage) s->memory[stage].patience = 150;
     s->h = h;
     s->ready = 1;
     return sklyanin_gyrostat_OK;

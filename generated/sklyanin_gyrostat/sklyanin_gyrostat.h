@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 321acec7ea3669230343a4c8221c884113f70ab3cf3338552cf253b861dd227a
+ * body-sha256: fd02c1a3d15c2bb48dba9ad5d873b3f4bb904c696a39cbf8e42afb8fa53a31aa
  */
 #ifndef SKLYANIN_GYROSTAT_H
 #define SKLYANIN_GYROSTAT_H
@@ -51,6 +51,7 @@ typedef enum {
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
+    int terms;    /* how many of them the recurrence uses */
     int fits;     /* how often weight has been fitted */
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */

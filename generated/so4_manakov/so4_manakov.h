@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 98be8dc1956432adfa9f6c4c0ee6fc862b8bf808d7a79c81b92f6292c62409d6
+ * body-sha256: e5717452df61344560b0793cb7d7955fc111bf9e2f100bd3c42fad14ef1c3b8f
  */
 #ifndef SO4_MANAKOV_H
 #define SO4_MANAKOV_H
@@ -47,15 +47,16 @@ typedef enum {
 } so4_manakov_status;
 
 /* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
-   fitted to the last 96 values. They affect speed only. */
+   fitted to the last 95 values. They affect speed only. */
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
+    int terms;    /* how many of them the recurrence uses */
     int fits;     /* how often weight has been fitted */
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */
     int patience; /* how many of those before the recurrence is fitted again */
-    double past[192][so4_manakov_DIM]; /* values, the latest last */
+    double past[190][so4_manakov_DIM]; /* values, the latest last */
     double weight[32][so4_manakov_DIM][8]; /* of past values, the latest first, for the next values */
 } so4_manakov_memory;
 

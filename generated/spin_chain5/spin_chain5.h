@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: a06052f836a31419b3a3aafbc8606403ee3ed08e531186b46d139e583ee2bfad
+ * body-sha256: a38cb45a9f543caf343bcd661c60fbf874dc19946a218c1be6ef22d82f0b05bb
  */
 #ifndef SPIN_CHAIN5_H
 #define SPIN_CHAIN5_H
@@ -47,15 +47,16 @@ typedef enum {
 } spin_chain5_status;
 
 /* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
-   fitted to the last 96 values. They affect speed only. */
+   fitted to the last 95 values. They affect speed only. */
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
+    int terms;    /* how many of them the recurrence uses */
     int fits;     /* how often weight has been fitted */
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */
     int patience; /* how many of those before the recurrence is fitted again */
-    double past[192][spin_chain5_DIM]; /* values, the latest last */
+    double past[190][spin_chain5_DIM]; /* values, the latest last */
     double weight[32][spin_chain5_DIM][8]; /* of past values, the latest first, for the next values */
 } spin_chain5_memory;
 

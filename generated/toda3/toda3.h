@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: af208bccca712aea2a8d0e5115a6598d9f3419e07473a5d634e54951f3a77db1
+ * body-sha256: 623022bab1c2d61e25151a6562547c364860e3312118a77831fc62f742827d78
  */
 #ifndef TODA3_H
 #define TODA3_H
@@ -46,15 +46,16 @@ typedef enum {
 } toda3_status;
 
 /* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
-   fitted to the last 96 values. They affect speed only. */
+   fitted to the last 95 values. They affect speed only. */
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
+    int terms;    /* how many of them the recurrence uses */
     int fits;     /* how often weight has been fitted */
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */
     int patience; /* how many of those before the recurrence is fitted again */
-    double past[192][toda3_DIM]; /* values, the latest last */
+    double past[190][toda3_DIM]; /* values, the latest last */
     double weight[32][toda3_DIM][8]; /* of past values, the latest first, for the next values */
 } toda3_memory;
 

@@ -12,7 +12,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 16f87bbd1c22189a03102fd04afad808a60a9ddd72391d961a114ca126496bcb
+ * body-sha256: 298b3edcf203a1b3eb6bfc820d0c99eceb714e636b8f93558e0c3fa41f26e642
  */
 #include "toda3_quadratic.h"
 
@@ -120,7 +120,7 @@ static int toda3_quadratic_predict(const toda3_quadratic_memory *memory, double 
     double odd[5] = { 0.0 }, binomial = -1.0;
     memset(value, 0, 5 * sizeof value[0]);
     if (memory->fitting) {
-        for (int k = 0; k < 32; k += 2)
+        for (int k = 0; k < memory->terms; k += 2)
             for (int i = 0; i < 5; ++i) {
                 value[i] += memory->weight[k][i][0] * memory->past[last - k][i];
                 odd[i] += memory->weight[k + 1][i][0] * memory->past[last - 1 - k][i];
@@ -161,38 +161,67 @@ static void toda3_quadratic_judge(toda3_quadratic_memory *memory, const double v
     if (memory->order == 0) memory->order = 1;
 }
 
-/* Fit the recurrences value[m + l] = sum of weight[k][..][l] * value[m - 1 - k], l = 0 ... 1 - 1, to the history,
-   component by component: ridge least squares by modified Gram-Schmidt, the ridge at the level of rounding. The last
-   1 columns of q are the right-hand sides. */
-static void toda3_quadratic_train(toda3_quadratic_memory *memory, int component)
+/* Make eight columns orthogonal to one, by the multiples of it that are put into r. Where that one is among the eight, those
+   up to it stay as they are, and inverse becomes one over its squared length. The number of rows is even. */
+static void toda3_quadratic_project(int rows, double (*one)[8], int column, double *inverse, double (*eight)[8], double r[8])
 {
-    enum { WINDOW = 32, AHEAD = 1, ROWS = 96 - WINDOW - AHEAD + 1 };
-    double q[ROWS + WINDOW][WINDOW + AHEAD], r[WINDOW][WINDOW + AHEAD], largest = 0.0;
+    double even[8] = { 0.0 }, odd[8] = { 0.0 };
+    for (int i = 0; i < rows; i += 2) {
+        const double entry = one[i][column], next = one[i + 1][column];
+        for (int l = 0; l < 8; ++l) even[l] += entry * eight[i][l];
+        for (int l = 0; l < 8; ++l) odd[l] += next * eight[i + 1][l];
+    }
+    for (int l = 0; l < 8; ++l) even[l] += odd[l];
+    if (one == eight) {
+        *inverse = even[column] > 0.0 ? 1.0 / even[column] : 0.0;
+        memset(even, 0, ((size_t)column + 1) * sizeof even[0]);
+    }
+    for (int l = 0; l < 8; ++l) r[l] = even[l] *= *inverse;
+    for (int i = 0; i < rows; ++i) {
+        const double entry = one[i][column];
+        for (int l = 0; l < 8; ++l) eight[i][l] -= entry * even[l];
+    }
+}
+
+/* Fit the recurrences value[m + l] = sum of weight[k][..][l] * value[m - 1 - k], l = 0 ... 1 - 1, to the history of
+   a component: ridge least squares by modified Gram-Schmidt, the ridge at the level of rounding. Columns are taken in by
+   eights, until they leave next to nothing of the right-hand sides. How many past values are used. */
+static int toda3_quadratic_train(toda3_quadratic_memory *memory, int component)
+{
+    enum { AHEAD = 1, WINDOW = 32, ROWS = 64 };
+    double q[WINDOW / 8][ROWS + WINDOW][8], r[WINDOW / 8][WINDOW][8], inverse[WINDOW]; /* eight columns in each part */
+    double right[ROWS + WINDOW][8], weight[WINDOW][8], value[96], largest = 0.0, left = HUGE_VAL;
+    int terms = 0;
     memset(q, 0, sizeof q);
-    memset(r, 0, sizeof r);
-    for (int i = 0; i < ROWS; ++i) {
-        for (int j = 0; j < WINDOW + AHEAD; ++j) {
-            const int place = j < WINDOW ? WINDOW - 1 - j : j;
-            q[i][j] = memory->past[memory->count - 96 + i + place][component];
-        }
-        if (fabs(q[i][0]) > largest) largest = fabs(q[i][0]);
+    memset(right, 0, sizeof right);
+    memset(weight, 0, sizeof weight);
+    for (int i = 0; i < 96; ++i) {
+        value[i] = memory->past[memory->count - 96 + i][component];
+        if (fabs(value[i]) > largest) largest = fabs(value[i]);
     }
-    for (int k = 0; k < WINDOW; ++k) q[ROWS + k][k] = 1e-13 * largest;
-    for (int k = 0; k < WINDOW; ++k) {
-        const int rows = ROWS + k + 1; /* further rows of the ridge are still zero in this column */
-        for (int i = 0; i < rows; ++i)
-            for (int j = k; j < WINDOW + AHEAD; ++j) r[k][j] += q[i][k] * q[i][j];
-        const double scale = r[k][k] > 0.0 ? 1.0 / r[k][k] : 0.0;
-        for (int j = k + 1; j < WINDOW + AHEAD; ++j) r[k][j] *= scale;
-        for (int i = 0; i < rows; ++i)
-            for (int j = k + 1; j < WINDOW + AHEAD; ++j) q[i][j] -= q[i][k] * r[k][j];
-    }
-    for (int l = 0; l < AHEAD; ++l)
-        for (int k = WINDOW - 1; k >= 0; --k) {
-            double sum = r[k][WINDOW + l];
-            for (int j = k + 1; j < WINDOW; ++j) sum -= r[k][j] * memory->weight[j][component][l];
-            memory->weight[k][component][l] = sum;
+    for (int i = 0; i < ROWS; ++i)
+        for (int l = 0; l < AHEAD; ++l) right[i][l] = value[i + WINDOW + l];
+    while (terms < WINDOW && left > 1e-12 * largest) {
+        const int part = terms / 8, rows = ROWS + terms + 8; /* further rows of the ridge are zero in these columns */
+        for (int i = 0; i < ROWS; ++i)
+            for (int l = 0; l < 8; ++l) q[part][i][l] = value[i + WINDOW - 1 - terms - l];
+        for (int l = 0; l < 8; ++l) q[part][ROWS + terms + l][l] = 1e-13 * largest;
+        for (int k = 0; k < terms; ++k) toda3_quadratic_project(rows, q[k / 8], k % 8, &inverse[k], q[part], r[part][k]);
+        for (int l = 0; l < 8; ++l, ++terms) {
+            toda3_quadratic_project(rows, q[part], l, &inverse[terms], q[part], r[part][terms]);
+            toda3_quadratic_project(rows, q[part], l, &inverse[terms], right, weight[terms]);
         }
+        double sum[8] = { 0.0 };
+        for (int i = 0; i < ROWS; ++i)
+            for (int l = 0; l < 8; ++l) sum[l] += fabs(right[i][l]);
+        left = 0.0;
+        for (int l = 0; l < 8; ++l) left += sum[l] / ROWS;
+    }
+    for (int k = terms - 1; k >= 0; --k)
+        for (int j = k + 1; j < terms; ++j)
+            for (int l = 0; l < 8; ++l) weight[k][l] -= r[j / 8][k][j % 8] * weight[j][l];
+    for (int k = 0; k < WINDOW; ++k) memcpy(memory->weight[k][component], weight[k], AHEAD * sizeof(double));
+    return terms;
 }
 
 /* Drop what is old, if so many values would not fit into the history. */
@@ -213,11 +242,15 @@ static void toda3_quadratic_record(toda3_quadratic_memory *memory, const double 
 /* Fit the recurrence to the last values; with every time, wait longer before it is done again. */
 static void toda3_quadratic_fit(toda3_quadratic_memory *memory)
 {
-    for (int i = 0; i < 5; ++i) toda3_quadratic_train(memory, i);
+    memory->terms = 0;
+    for (int i = 0; i < 5; ++i) {
+        const int terms = toda3_quadratic_train(memory, i);
+        if (terms > memory->terms) memory->terms = terms;
+    }
     memory->fitting = 1;
     ++memory->fits;
     memory->slow = 0;
-    memory->patience = memory->patience < 10000 ? 2 * memory->patience + 1000 : 20000;
+    memory->patience = memory->patience < 10000 ? 2 * memory->patience + 150 : 20000;
 }
 
 /* Take in the solved value: what took one iteration needs no better guess. */
@@ -545,7 +578,7 @@ static toda3_quadratic_status toda3_quadratic_set_step(toda3_quadratic_solver *s
     for (int stage = 0; stage < 1; ++stage)
         toda3_quadratic_prepare(&s->params, toda3_quadratic_fractions[stage] * h, s->coef[stage]);
     memset(s->memory, 0, sizeof s->memory);
-    for (int stage = 0; stage < 1; ++stage) s->memory[stage].patience = 1000;
+    for (int stage = 0; stage < 1; ++stage) s->memory[stage].patience = 150;
     s->h = h;
     s->ready = 1;
     return toda3_quadratic_OK;

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: b69dc4d1be08c44d44c123047f48a16056a20d193138fbe5e9b95c89f2bf3be9
+ * body-sha256: 9899acc70c8414ab711fcee45a0d9110e60860174afae8a7f5250d25400af872
  */
 #include "volterra5.h"
 
@@ -272,7 +272,7 @@ static int volterra5_predict(const volterra5_memory *memory, double value[5])
     double odd[5] = { 0.0 }, binomial = -1.0;
     memset(value, 0, 5 * sizeof value[0]);
     if (memory->fitting) {
-        for (int k = 0; k < 32; k += 2)
+        for (int k = 0; k < memory->terms; k += 2)
             for (int i = 0; i < 5; ++i) {
                 value[i] += memory->weight[k][i][0] * memory->past[last - k][i];
                 odd[i] += memory->weight[k + 1][i][0] * memory->past[last - 1 - k][i];
@@ -313,46 +313,75 @@ static void volterra5_judge(volterra5_memory *memory, const double value[5])
     if (memory->order == 0) memory->order = 1;
 }
 
-/* Fit the recurrences value[m + l] = sum of weight[k][..][l] * value[m - 1 - k], l = 0 ... 8 - 1, to the history,
-   component by component: ridge least squares by modified Gram-Schmidt, the ridge at the level of rounding. The last
-   8 columns of q are the right-hand sides. */
-static void volterra5_train(volterra5_memory *memory, int component)
+/* Make eight columns orthogonal to one, by the multiples of it that are put into r. Where that one is among the eight, those
+   up to it stay as they are, and inverse becomes one over its squared length. The number of rows is even. */
+static void volterra5_project(int rows, double (*one)[8], int column, double *inverse, double (*eight)[8], double r[8])
 {
-    enum { WINDOW = 32, AHEAD = 8, ROWS = 96 - WINDOW - AHEAD + 1 };
-    double q[ROWS + WINDOW][WINDOW + AHEAD], r[WINDOW][WINDOW + AHEAD], largest = 0.0;
+    double even[8] = { 0.0 }, odd[8] = { 0.0 };
+    for (int i = 0; i < rows; i += 2) {
+        const double entry = one[i][column], next = one[i + 1][column];
+        for (int l = 0; l < 8; ++l) even[l] += entry * eight[i][l];
+        for (int l = 0; l < 8; ++l) odd[l] += next * eight[i + 1][l];
+    }
+    for (int l = 0; l < 8; ++l) even[l] += odd[l];
+    if (one == eight) {
+        *inverse = even[column] > 0.0 ? 1.0 / even[column] : 0.0;
+        memset(even, 0, ((size_t)column + 1) * sizeof even[0]);
+    }
+    for (int l = 0; l < 8; ++l) r[l] = even[l] *= *inverse;
+    for (int i = 0; i < rows; ++i) {
+        const double entry = one[i][column];
+        for (int l = 0; l < 8; ++l) eight[i][l] -= entry * even[l];
+    }
+}
+
+/* Fit the recurrences value[m + l] = sum of weight[k][..][l] * value[m - 1 - k], l = 0 ... 8 - 1, to the history of
+   a component: ridge least squares by modified Gram-Schmidt, the ridge at the level of rounding. Columns are taken in by
+   eights, until they leave next to nothing of the right-hand sides. How many past values are used. */
+static int volterra5_train(volterra5_memory *memory, int component)
+{
+    enum { AHEAD = 8, WINDOW = 32, ROWS = 56 };
+    double q[WINDOW / 8][ROWS + WINDOW][8], r[WINDOW / 8][WINDOW][8], inverse[WINDOW]; /* eight columns in each part */
+    double right[ROWS + WINDOW][8], weight[WINDOW][8], value[95], largest = 0.0, left = HUGE_VAL;
+    int terms = 0;
     memset(q, 0, sizeof q);
-    memset(r, 0, sizeof r);
-    for (int i = 0; i < ROWS; ++i) {
-        for (int j = 0; j < WINDOW + AHEAD; ++j) {
-            const int place = j < WINDOW ? WINDOW - 1 - j : j;
-            q[i][j] = memory->past[memory->count - 96 + i + place][component];
-        }
-        if (fabs(q[i][0]) > largest) largest = fabs(q[i][0]);
+    memset(right, 0, sizeof right);
+    memset(weight, 0, sizeof weight);
+    for (int i = 0; i < 95; ++i) {
+        value[i] = memory->past[memory->count - 95 + i][component];
+        if (fabs(value[i]) > largest) largest = fabs(value[i]);
     }
-    for (int k = 0; k < WINDOW; ++k) q[ROWS + k][k] = 1e-13 * largest;
-    for (int k = 0; k < WINDOW; ++k) {
-        const int rows = ROWS + k + 1; /* further rows of the ridge are still zero in this column */
-        for (int i = 0; i < rows; ++i)
-            for (int j = k; j < WINDOW + AHEAD; ++j) r[k][j] += q[i][k] * q[i][j];
-        const double scale = r[k][k] > 0.0 ? 1.0 / r[k][k] : 0.0;
-        for (int j = k + 1; j < WINDOW + AHEAD; ++j) r[k][j] *= scale;
-        for (int i = 0; i < rows; ++i)
-            for (int j = k + 1; j < WINDOW + AHEAD; ++j) q[i][j] -= q[i][k] * r[k][j];
-    }
-    for (int l = 0; l < AHEAD; ++l)
-        for (int k = WINDOW - 1; k >= 0; --k) {
-            double sum = r[k][WINDOW + l];
-            for (int j = k + 1; j < WINDOW; ++j) sum -= r[k][j] * memory->weight[j][component][l];
-            memory->weight[k][component][l] = sum;
+    for (int i = 0; i < ROWS; ++i)
+        for (int l = 0; l < AHEAD; ++l) right[i][l] = value[i + WINDOW + l];
+    while (terms < WINDOW && left > 1e-12 * largest) {
+        const int part = terms / 8, rows = ROWS + terms + 8; /* further rows of the ridge are zero in these columns */
+        for (int i = 0; i < ROWS; ++i)
+            for (int l = 0; l < 8; ++l) q[part][i][l] = value[i + WINDOW - 1 - terms - l];
+        for (int l = 0; l < 8; ++l) q[part][ROWS + terms + l][l] = 1e-13 * largest;
+        for (int k = 0; k < terms; ++k) volterra5_project(rows, q[k / 8], k % 8, &inverse[k], q[part], r[part][k]);
+        for (int l = 0; l < 8; ++l, ++terms) {
+            volterra5_project(rows, q[part], l, &inverse[terms], q[part], r[part][terms]);
+            volterra5_project(rows, q[part], l, &inverse[terms], right, weight[terms]);
         }
+        double sum[8] = { 0.0 };
+        for (int i = 0; i < ROWS; ++i)
+            for (int l = 0; l < 8; ++l) sum[l] += fabs(right[i][l]);
+        left = 0.0;
+        for (int l = 0; l < 8; ++l) left += sum[l] / ROWS;
+    }
+    for (int k = terms - 1; k >= 0; --k)
+        for (int j = k + 1; j < terms; ++j)
+            for (int l = 0; l < 8; ++l) weight[k][l] -= r[j / 8][k][j % 8] * weight[j][l];
+    for (int k = 0; k < WINDOW; ++k) memcpy(memory->weight[k][component], weight[k], AHEAD * sizeof(double));
+    return terms;
 }
 
 /* Drop what is old, if so many values would not fit into the history. */
 static void volterra5_make_room(volterra5_memory *memory, int values)
 {
-    if (memory->count + values <= 192) return;
-    memmove(memory->past, memory->past + memory->count - 96, 96 * sizeof memory->past[0]);
-    memory->count = 96;
+    if (memory->count + values <= 190) return;
+    memmove(memory->past, memory->past + memory->count - 95, 95 * sizeof memory->past[0]);
+    memory->count = 95;
 }
 
 /* Add a value to the history. */
@@ -365,11 +394,15 @@ static void volterra5_record(volterra5_memory *memory, const double value[5])
 /* Fit the recurrence to the last values; with every time, wait longer before it is done again. */
 static void volterra5_fit(volterra5_memory *memory)
 {
-    for (int i = 0; i < 5; ++i) volterra5_train(memory, i);
+    memory->terms = 0;
+    for (int i = 0; i < 5; ++i) {
+        const int terms = volterra5_train(memory, i);
+        if (terms > memory->terms) memory->terms = terms;
+    }
     memory->fitting = 1;
     ++memory->fits;
     memory->slow = 0;
-    memory->patience = memory->patience < 10000 ? 2 * memory->patience + 1000 : 20000;
+    memory->patience = memory->patience < 10000 ? 2 * memory->patience + 150 : 20000;
 }
 
 /* Take in the solved value: what took one iteration needs no better guess. */
@@ -378,7 +411,7 @@ static void volterra5_remember(volterra5_memory *memory, const double value[5], 
     if (iterations > 1) volterra5_judge(memory, value);
     volterra5_record(memory, value);
     memory->slow = iterations > 1 ? memory->slow + 1 : 0;
-    if (memory->slow > memory->patience && memory->count >= 96) volterra5_fit(memory);
+    if (memory->slow > memory->patience && memory->count >= 95) volterra5_fit(memory);
 }
 
 /* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last
@@ -490,7 +523,7 @@ static volterra5_status volterra5_set_step(volterra5_solver *s, double h)
     for (int stage = 0; stage < 1; ++stage)
         volterra5_prepare(&s->params, volterra5_fractions[stage] * h, s->coef[stage]);
     memset(s->memory, 0, sizeof s->memory);
-    for (int stage = 0; stage < 1; ++stage) s->memory[stage].patience = 1000;
+    for (int stage = 0; stage < 1; ++stage) s->memory[stage].patience = 150;
     s->pause = 16;
     s->setback = s->foreseeing = 0;
     s->doubt = s->retry = 0;
@@ -549,25 +582,24 @@ typedef struct {
 static inline double volterra5_expm1_lane(double u)
 {
     const double shifted = u * 1.4426950408889634 + 6755399441055744.0, k = shifted - 6755399441055744.0;
-    const double r = (u - k * 0.6931471803691238) - k * 1.9082149292705877e-10;
+    const double r = (u - k * 0.6931471803691238) - k * 1.9082149292705877e-10, rr = r * r;
     uint64_t bits; /* the last bits of shifted are k */
-    double power, sum = 1.1470745597729725e-11;
+    double power, sum = 1.1470745597729725e-11, other = 1.6059043836821613e-10;
     memcpy(&bits, &shifted, sizeof bits);
     bits = (bits + 1023) << 52;
     memcpy(&power, &bits, sizeof power);
-    sum = sum * r + 1.6059043836821613e-10;
-    sum = sum * r + 2.08767569878681e-09;
-    sum = sum * r + 2.505210838544172e-08;
-    sum = sum * r + 2.755731922398589e-07;
-    sum = sum * r + 2.7557319223985893e-06;
-    sum = sum * r + 2.48015873015873e-05;
-    sum = sum * r + 0.0001984126984126984;
-    sum = sum * r + 0.001388888888888889;
-    sum = sum * r + 0.008333333333333333;
-    sum = sum * r + 0.041666666666666664;
-    sum = sum * r + 0.16666666666666666;
-    sum = sum * r + 0.5;
-    sum = sum * r * r + r;
+    sum = sum * rr + 2.08767569878681e-09;
+    other = other * rr + 2.505210838544172e-08;
+    sum = sum * rr + 2.755731922398589e-07;
+    other = other * rr + 2.7557319223985893e-06;
+    sum = sum * rr + 2.48015873015873e-05;
+    other = other * rr + 0.0001984126984126984;
+    sum = sum * rr + 0.001388888888888889;
+    other = other * rr + 0.008333333333333333;
+    sum = sum * rr + 0.041666666666666664;
+    other = other * rr + 0.16666666666666666;
+    sum = (sum * r + other) * r + 0.5;
+    sum = sum * rr + r;
     return power * sum + (power - 1.0) + (fabs(u) <= 700.0 ? 0.0 : HUGE_VAL);
 }
 
@@ -977,7 +1009,7 @@ static void volterra5_refresh(const volterra5_solver *s, volterra5_table *table)
         table->fits[stage] = s->memory[stage].fits;
         for (int k = 0; k < 4; ++k)
             for (int lane = 0; lane < volterra5_LANES; ++lane) table->coef[stage][k][lane] = s->coef[stage][k];
-        memcpy(table->weight[stage], s->memory[stage].weight, sizeof table->weight[stage]);
+        memcpy(table->weight[stage], s->memory[stage].weight, (size_t)s->memory[stage].terms * sizeof table->weight[0][0]);
     }
 }
 
@@ -987,15 +1019,16 @@ static void volterra5_foresee(const volterra5_memory *memory, volterra5_lanes we
 {
     const int last = memory->count - 1;
     for (int i = 0; i < 5; ++i) {
-        volterra5_EACH_LANE
-        for (int lane = 0; lane < volterra5_LANES; ++lane) {
-            double even = 0.0, odd = 0.0;
-            for (int k = 0; k < 32; k += 2) {
-                even += weight[k][i][lane] * memory->past[last - k][i];
-                odd += weight[k + 1][i][lane] * memory->past[last - 1 - k][i];
-            }
-            y[i][lane] = even + odd;
+        volterra5_lanes even = { 0.0 }, odd = { 0.0 };
+        for (int k = 0; k < memory->terms; k += 2) {
+            const double past = memory->past[last - k][i], earlier = memory->past[last - 1 - k][i];
+            volterra5_EACH_LANE
+            for (int lane = 0; lane < volterra5_LANES; ++lane) even[lane] += weight[k][i][lane] * past;
+            volterra5_EACH_LANE
+            for (int lane = 0; lane < volterra5_LANES; ++lane) odd[lane] += weight[k + 1][i][lane] * earlier;
         }
+        volterra5_EACH_LANE
+        for (int lane = 0; lane < volterra5_LANES; ++lane) y[i][lane] = even[lane] + odd[lane];
     }
 }
 
@@ -1094,11 +1127,11 @@ static int volterra5_block(volterra5_solver *s, volterra5_table *table, int most
 static void volterra5_choose_guess(volterra5_solver *s, size_t steps)
 {
     for (int stage = 0; stage < 1; ++stage)
-        if (s->memory[stage].count < 96) {
+        if (s->memory[stage].count < 95) {
             s->foreseeing = 0;
             return;
         }
-    if (s->foreseeing || (steps < 4000 && s->steps < 1000) || s->steps < s->retry) return;
+    if (s->foreseeing || (steps < 600 && s->steps < 150) || s->steps < s->retry) return;
     for (int stage = 0; stage < 1; ++stage) volterra5_fit(&s->memory[stage]);
     s->foreseeing = 1;
     s->pause = volterra5_LANES;
@@ -1118,7 +1151,7 @@ static void volterra5_learn_from(volterra5_solver *s, int passes)
         s->passes = passes > 0 ? passes : INT_MAX;
     } else if (passes > s->passes || s->setback > 5 * volterra5_LANES) {
         s->foreseeing = s->setback = s->pause = 0;
-        s->doubt = 2 * s->doubt + 4000;
+        s->doubt = 2 * s->doubt + 600;
         s->retry = s->steps + s->doubt;
     }
 }
@@ -1158,11 +1191,12 @@ volterra5_status volterra5_integrate(volterra5_solver *s, double h, size_t steps
 /* Members of an ensemble, each in its lane. */
 typedef struct {
     volterra5_lanes x[5], carry[5], coef[1][4];
-    volterra5_lanes past[1][96][5]; /* solved values, in a ring */
+    volterra5_lanes past[1][95][5]; /* solved values, in a ring */
     volterra5_lanes weight[1][32][5]; /* of past values, the latest first, for the next */
     int latest;     /* the row of the latest values */
     int count;      /* rows in use */
     int order[1];   /* how many of them the extrapolation uses */
+    int terms[1];   /* how many of them the recurrences use */
     int fits;       /* how often recurrences have been fitted */
     int fitting[1]; /* whether they are the better guess */
     int slow;       /* how many of the last steps took more than one iteration */
@@ -1174,14 +1208,14 @@ typedef struct {
 /* The past values of a stage, the latest for k = 0. */
 static volterra5_lanes *volterra5_group_past(volterra5_group *group, int stage, int k)
 {
-    return group->past[stage][(group->latest + k) % 96];
+    return group->past[stage][(group->latest + k) % 95];
 }
 
 /* Guess the values of a stage by the recurrences of the members. */
 static void volterra5_group_foresee(volterra5_group *group, int stage, volterra5_lanes y[restrict 5])
 {
     memset(y, 0, 5 * sizeof y[0]);
-    for (int k = 0; k < 32; ++k) {
+    for (int k = 0; k < group->terms[stage]; ++k) {
         volterra5_lanes *past = volterra5_group_past(group, stage, k), *weight = group->weight[stage][k];
         for (int i = 0; i < 5; ++i) {
             volterra5_EACH_LANE
@@ -1253,21 +1287,22 @@ static void volterra5_group_fit(volterra5_group *group)
 {
     volterra5_memory memory;
     const int helped = group->fits == 0 || group->fitting[0];
-    memory.count = 96;
-    for (int stage = 0; stage < 1; ++stage)
-        for (int lane = 0; lane < volterra5_LANES; ++lane) {
-            for (int i = 0; i < 5; ++i) {
-                for (int k = 0; k < 96; ++k)
-                    memory.past[96 - 1 - k][i] = volterra5_group_past(group, stage, k)[i][lane];
-                if (group->active[lane]) volterra5_train(&memory, i);
-                for (int k = 0; k < 32 && group->active[lane]; ++k)
-                    group->weight[stage][k][i][lane] = memory.weight[k][i][0];
+    memory.count = 95;
+    for (int stage = 0; stage < 1; ++stage) {
+        group->terms[stage] = 0;
+        for (int lane = 0; lane < volterra5_LANES; ++lane)
+            for (int i = 0; i < 5 && group->active[lane]; ++i) {
+                for (int k = 0; k < 95; ++k)
+                    memory.past[95 - 1 - k][i] = volterra5_group_past(group, stage, k)[i][lane];
+                const int terms = volterra5_train(&memory, i);
+                if (terms > group->terms[stage]) group->terms[stage] = terms;
+                for (int k = 0; k < 32; ++k) group->weight[stage][k][i][lane] = memory.weight[k][i][0];
             }
-            group->fitting[stage] = 1;
-        }
+        group->fitting[stage] = 1;
+    }
     ++group->fits;
     group->slow = 0;
-    group->patience = helped && group->patience < 10000 ? 2 * group->patience + 1000 : 100 * 1000;
+    group->patience = helped && group->patience < 10000 ? 2 * group->patience + 150 : 100 * 150;
 }
 
 /* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group.
@@ -1355,7 +1390,7 @@ static int volterra5_group_step(volterra5_group *group, size_t remaining)
 {
     volterra5_lanes x[5], carry[5];
     volterra5_model model;
-    const int next = (group->latest + 96 - 1) % 96;
+    const int next = (group->latest + 95 - 1) % 95;
     int active = 0, most = 0;
     memcpy(x, group->x, sizeof x);
     memcpy(carry, group->carry, sizeof carry);
@@ -1367,9 +1402,9 @@ static int volterra5_group_step(volterra5_group *group, size_t remaining)
         memcpy(group->past[stage][next], model.y, sizeof model.y);
     }
     group->latest = next;
-    if (group->count < 96) ++group->count;
+    if (group->count < 95) ++group->count;
     group->slow = most > 1 ? group->slow + 1 : 0;
-    if (group->slow > group->patience && group->count == 96 && remaining >= 4000)
+    if (group->slow > group->patience && group->count == 95 && remaining >= 600)
         volterra5_group_fit(group);
     for (int lane = 0; lane < volterra5_LANES; ++lane) {
         for (int i = 0; i < 5; ++i)

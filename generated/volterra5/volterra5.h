@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: a04bad1735ebcc197e5f4fa29c9ff3e928c4f2d006c59dc99f30e25c29a56a29
+ * body-sha256: 9cbdd12779d3a45fb8353e2ea26d1091844a60dfa8d0357e2f194a37790b7613
  */
 #ifndef VOLTERRA5_H
 #define VOLTERRA5_H
@@ -46,15 +46,16 @@ typedef enum {
 } volterra5_status;
 
 /* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
-   fitted to the last 96 values. They affect speed only. */
+   fitted to the last 95 values. They affect speed only. */
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
+    int terms;    /* how many of them the recurrence uses */
     int fits;     /* how often weight has been fitted */
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */
     int patience; /* how many of those before the recurrence is fitted again */
-    double past[192][volterra5_DIM]; /* values, the latest last */
+    double past[190][volterra5_DIM]; /* values, the latest last */
     double weight[32][volterra5_DIM][8]; /* of past values, the latest first, for the next values */
 } volterra5_memory;
 

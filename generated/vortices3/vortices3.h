@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: fde6483ba9bfcaa338664e7983a93277b97d6d47a486c70d905a14da4532f53c
+ * body-sha256: 6e7668782961d928bc53cd33e106f53dcf6afa8b6c1149622997151b60dc053d
  */
 #ifndef VORTICES3_H
 #define VORTICES3_H
@@ -46,15 +46,16 @@ typedef enum {
 } vortices3_status;
 
 /* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
-   fitted to the last 96 values. They affect speed only. */
+   fitted to the last 95 values. They affect speed only. */
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
+    int terms;    /* how many of them the recurrence uses */
     int fits;     /* how often weight has been fitted */
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */
     int patience; /* how many of those before the recurrence is fitted again */
-    double past[192][vortices3_DIM]; /* values, the latest last */
+    double past[190][vortices3_DIM]; /* values, the latest last */
     double weight[32][vortices3_DIM][8]; /* of past values, the latest first, for the next values */
 } vortices3_memory;
 

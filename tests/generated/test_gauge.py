@@ -57,6 +57,37 @@ def test_step_is_a_poisson_map_for_a_fixed_gauge(name):
     assert defect <= 1e-12
 
 
+def leading_error(name):
+    """Σ|π∇S_3|² on the samples of the solver, as a function of the gauge, and the size of the error vectors."""
+    numpy, (x, _) = module(gauged(name)), start_of(name)
+    points = numpy._samples(numpy.DEFAULT_PARAMETERS, x[np.newaxis])
+
+    def vectors(gauge):
+        return numpy._guide(numpy.DEFAULT_PARAMETERS, np.array(gauge, dtype=float)[:, np.newaxis], points)
+
+    return vectors, numpy.gauge(x)
+
+
+@pytest.mark.parametrize("name", GAUGED)
+def test_leading_error_is_cubic_in_the_gauge(name):
+    """So its square is the polynomial of degree six through seven values that the solver takes it for."""
+    vectors, gauge = leading_error(name)
+    for c in range(len(gauge)):
+        along = np.array([vectors(gauge + t * np.eye(len(gauge))[c]) for t in range(5)])
+        assert np.max(np.abs(np.diff(along, 4, axis=0))) <= 1e-12 * np.max(np.abs(along))
+        assert np.max(np.abs(np.diff(along, 1, axis=0))) > 1e-3 * np.max(np.abs(along))
+
+
+@pytest.mark.parametrize("name", GAUGED)
+def test_the_gauge_chosen_is_best_along_each_axis(name):
+    vectors, gauge = leading_error(name)
+    least = np.sum(vectors(gauge) ** 2)
+    for c in range(len(gauge)):
+        for change in [*np.linspace(-2, 2, 81), -1e-2, 1e-2]:
+            moved = gauge + change * np.abs(gauge[c]) * np.eye(len(gauge))[c]
+            assert np.sum(vectors(moved) ** 2) >= least * (1 - 1e-4), (gauge, change)
+
+
 @pytest.mark.parametrize("name", GAUGED)
 def test_both_targets_choose_the_same_gauge(name):
     compilation = gauged(name)

@@ -16,11 +16,15 @@ from phigen.targets.rendering import render
 #: Backward differences kept for the starting guess of the inner solve.
 HISTORY = 8
 
-#: Past values that the fitted recurrence uses, and values that it is fitted to; less where the solver grows too large.
-WINDOW, FITTED, SMALLEST = 32, 96, 30
+#: Past values that the fitted recurrence may use, a multiple of 8, and values that it is fitted to; fewer where the
+#: solver would grow too large.
+WINDOW, FITTED, SMALLEST = 32, 96, 32
+
+#: The recurrence uses no more values than leave so little, in sizes of the largest.
+ENOUGH = 1e-12
 
 #: Steps that a fit costs, about; with the recurrences for whole blocks, four times as many are saved in.
-REPAY = 1000
+REPAY = 150
 
 #: How far from the last value a guess may be, in sizes of that value.
 REACH = 4.0
@@ -99,15 +103,20 @@ def _values(program: Program) -> dict[str, object]:
 
 def _memory_values(program: Program) -> dict[str, Any]:
     affordable = MOST_HISTORY // (2 * program.dimension * len(program.fractions))
-    fitted = max(SMALLEST, min(FITTED, affordable))
+    values = max(SMALLEST, min(FITTED, affordable))
+    window = 8 * (values * WINDOW // FITTED // 8)
     ahead = LANES if lanes.blocks(program) else 1
+    rows = 2 * ((values - window - ahead + 1) // 2)
+    fitted = rows + window + ahead - 1
     return {
         "fitted": fitted,
         "kept": 2 * fitted,
         "repay": REPAY,
         "reach": repr(REACH),
         "most_repay": 4 * REPAY,
-        "window": 2 * (fitted * WINDOW // FITTED // 2),
+        "window": window,
+        "rows": rows,
+        "enough": repr(ENOUGH),
         "ahead": ahead,
         "horizon": "the next values" if ahead > 1 else "the next value",
     }
@@ -210,7 +219,7 @@ def _body(program: Program) -> str:
         pieces += [static("generate" if program.path else "linearise"), _render("pivoting.c", values)]
         if "eliminate" in kernels:
             pieces += [static("eliminate"), _render("unrolled.c", values)]
-        pieces += [_render("remember.c", values), _render("train.c", values), _render("learn.c", values)]
+        pieces += [_render(f"{template}.c", values) for template in ("remember", "project", "train", "learn")]
     if program.driver != "splitting" or program.extras.tangent:
         pieces.append(_render("advance.c", values))
     if program.path:
@@ -229,7 +238,7 @@ def _body(program: Program) -> str:
         pieces.append(_render("compose.c", values))
     if program.gauge:
         pieces += [static("guide"), static("products"), _render("gauge.c", values)]
-        pieces.append(_render("choose_gauge.c", values))
+        pieces += [_render("gauge_line.c", values), _render("choose_gauge.c", values)]
     if program.extras.tangent:
         pieces += extras.tangent(program, values, _path_syntax(program))
     if "modified" in kernels:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Set
+from collections.abc import Mapping, Sequence, Set
 from dataclasses import replace
 from typing import Any
 
@@ -153,13 +153,19 @@ def _without_matrices(kernel: Kernel) -> Kernel:
 
 
 def _phi(program: Program, name: str) -> Mapping[str, object]:
-    *others, last = lane_coefficients(order_of(name))
     return {
         "name": f"{program.name}_{name}",
         "reach": repr(LANE_REACH),
-        "last": repr(last),
-        "others": [repr(c) for c in reversed(others)],
+        **_alternating(lane_coefficients(order_of(name))),
     }
+
+
+def _alternating(coefficients: Sequence[float]) -> Mapping[str, object]:
+    """A polynomial, given by an odd number of coefficients, as c_0 + two sums over every second term."""
+    first, *rest = map(repr, coefficients)
+    before, last = rest[-2:]
+    others = list(zip(rest[-3::-2], rest[-4::-2], strict=True))
+    return {"first": first, "before": before, "last": last, "others": others}
 
 
 def _exponential(program: Program, name: str) -> Mapping[str, object]:
@@ -169,8 +175,7 @@ def _exponential(program: Program, name: str) -> Mapping[str, object]:
         "meaning": {"exp": "exp(u)", "expm1": "exp(u) - 1"}[name],
         "rest": {"exp": "power", "expm1": "(power - 1.0)"}[name],
         "reach": repr(_EXP_REACH),
-        "last": repr(coefficients[-1]),
-        "others": [repr(c) for c in reversed(coefficients[:-1])],
+        **_alternating(coefficients),
     }
 
 
@@ -178,8 +183,7 @@ def _logarithm(program: Program) -> Mapping[str, object]:
     coefficients = [1 / (2 * k + 1) for k in range(1, _LOG_TERMS + 1)]
     return {
         "name": f"{program.name}_log",
-        "last": repr(coefficients[-1]),
-        "others": [repr(c) for c in reversed(coefficients[:-1])],
+        **_alternating(coefficients),
     }
 
 
@@ -193,6 +197,5 @@ def _sine(program: Program, name: str) -> Mapping[str, object]:
         "pi_2": repr(_PI[1]),
         "pi_3": repr(_PI[2]),
         "reach": repr(_SINE_REACH),
-        "last": repr(coefficients[-1]),
-        "others": [repr(c) for c in reversed(coefficients[:-1])],
+        **_alternating(coefficients),
     }

@@ -64,7 +64,8 @@ def emit(program: Program, command: str) -> dict[str, str]:
     pieces += [render("numpy", "phi.py", special.values(f, f"_{f}")) for f in special.used(program)]
     pieces += [render("numpy", "entire.py", special.entire_values(f)) for f in special.entire_used(program)]
     pieces += _driver(program)
-    pieces.append(render("numpy", "gauge.py" if program.gauge else "no_gauge.py", _values(program)))
+    gauge = ("gauge_line.py", "gauge.py") if program.gauge else ("no_gauge.py",)
+    pieces += [render("numpy", template, _values(program)) for template in gauge]
     pieces += [_function(program, kernels[k]) for k in ("guide", "products") if k in kernels]
     pieces += [render("numpy", "api.py", _values(program))]
     pieces += [_function(program, kernels[k]) for k in ("energy", "casimirs", "vector_field")]
