@@ -158,16 +158,35 @@ class NumpySolver:
         return NumpySession.from_bytes(self.module, parameters, saved)
 
     def ensemble(self, x0: Floats, h: float, steps: int, parameters: Mapping[str, float]) -> Floats:
-        """See `phigen.runtime.interface.Backend`."""
-        if steps == 0 or len(x0) == 0:
-            return x0.copy()
-        try:
-            rows = self.module.integrate(x0, h, steps, stride=steps, **self._options, **parameters)
-        except self.module.StepError as error:
-            states = np.asarray(error.states, dtype=np.float64)
-            members = tuple(int(m) for m in error.members)
-            raise BackendError(str(error.status), int(error.step), states[-1], members) from error
-        return np.asarray(rows[-1], dtype=np.float64)
+        """See `phigen.runtime.interface.Backend`. Where members fail, the others go on without them."""
+        x, remaining, gauge = x0.copy(), np.arange(len(x0)), self._gauges(x0, parameters)
+        failures: dict[int, str] = {}
+        done, first = 0, -1
+        while done < steps and remaining.size:
+            options = {} if gauge is None else {"gauge": gauge[remaining]}
+            try:
+                x[remaining] = self.module.integrate(
+                    x[remaining], h, steps - done, stride=steps - done, **options, **parameters
+                )[-1]
+                done = steps
+            except self.module.StepError as error:
+                x[remaining] = np.asarray(error.states)[-1]
+                failures |= {int(remaining[m]): str(error.status) for m in error.members}
+                done += int(error.step)
+                first = done if first < 0 else first
+                remaining = np.delete(remaining, error.members)
+        if failures:
+            members = tuple(sorted(failures))
+            raise BackendError(failures[members[0]], first, x, members)
+        return x
+
+    def _gauges(self, x0: Floats, parameters: Mapping[str, float]) -> Floats | None:
+        """The gauge of each member, None where there is no gauge."""
+        if not self.module.GAUGE:
+            return None
+        given = self._options.get("gauge")
+        chosen = self.module.gauge(x0, **parameters) if given is None else given
+        return np.broadcast_to(chosen, (len(x0), len(self.module.GAUGE)))
 
     def hamiltonian(self, x: Floats, parameters: Mapping[str, float]) -> Floats:
         """See `phigen.runtime.interface.Backend`."""
