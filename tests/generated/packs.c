@@ -82,11 +82,10 @@ static void failures_stay_alone(int members, int steps)
     }
 }
 
-/* The packs go through all steps: what ends well is not done by single steps. Members that do not fit the polynomials
-   near 0 are not left to single steps either. */
-static void groups_make_all_steps(double h)
+static F(group) group;
+
+static void begin(double h, size_t steps)
 {
-    static F(group) group;
     double x0[DIM];
     memset(&group, 0, sizeof group);
     group.packs = F(PACKS);
@@ -95,15 +94,35 @@ static void groups_make_all_steps(double h)
         EXPECT(F(init)(&group.s, NULL, x0) == F(OK));
         for (int i = 0; i < DIM; ++i) group.pack[m / F(LANES)].x[i][m % F(LANES)] = x0[i];
         group.active[m] = 1;
-        group.left[m] = 40;
+        group.left[m] = steps;
     }
     EXPECT(F(set_step)(&group.s, h) == F(OK));
+}
+
+/* The packs go through all steps: what ends well is not done by single steps. Members that do not fit the polynomials
+   near 0 are not left to single steps either. */
+static void groups_make_all_steps(double h)
+{
+    begin(h, 40);
     EXPECT(F(group_steps)(&group, 30) == F(GROUP));
     EXPECT(F(group_steps)(&group, 10) == F(GROUP));
     for (int m = 0; m < F(GROUP); ++m) EXPECT(group.left[m] == 0);
 #if FAR > 1
     EXPECT(group.far == (h != STEP));
 #endif
+}
+
+/* A member that leaves the group makes the rest of its steps from where it was, with what rounding took from there. */
+static void those_who_leave_go_on(void)
+{
+    double x0[DIM];
+    const int m = F(LANES) + 3;
+    begin(STEP, 70);
+    EXPECT(F(group_steps)(&group, 40) == F(GROUP));
+    EXPECT(group.left[m] == 30);
+    status[0] = F(group_end)(&group, m, STEP, x);
+    member(m, x0);
+    expect_steps(1, 0, x0, STEP, 70, ULPS);
 }
 
 int main(void)
@@ -116,6 +135,7 @@ int main(void)
     failures_stay_alone(MOST, 40);
     groups_make_all_steps(STEP);
     groups_make_all_steps(FAR * STEP);
+    those_who_leave_go_on();
     EXPECT(F(ensemble)(NULL, NULL, 3, STEP, 1, NULL) == F(BAD_ARGUMENT));
     EXPECT(F(ensemble)(NULL, x, 0, STEP, 1, NULL) == F(OK));
     fill(9);
