@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 01df44e4e1bfc9e5c35bee2b9ae44321f9d2c21dfa272431c93168b3157f5172
+ * body-sha256: 6080f0f3d659fa154824a153809154b637319351cf6d6674ab3c5e2f2b2b2eaa
  */
 #include "gaussian_moments.h"
 
@@ -620,7 +620,7 @@ typedef struct {
     gaussian_moments_lanes inverse[9], slope[9], gain[9];
 } gaussian_moments_model;
 
-/* gaussian_moments_phi0 for the loops over lanes: no branches. Infinite beyond |s| = 4.0. */
+/* gaussian_moments_phi0 for the loops over lanes: no branches. No number beyond |s| = 4.0. */
 static inline double gaussian_moments_phi0_lane(double s)
 {
     const double ss = s * s;
@@ -640,10 +640,10 @@ static inline double gaussian_moments_phi0_lane(double s)
     sum = sum * ss + 3.306878306878307e-05;
     other = other * ss + 0.001388888888888889;
     sum = (sum * s + other) * s + 0.08333333333333333;
-    return sum + (fabs(s) <= 4.0 ? 0.0 : HUGE_VAL);
+    return sum + (fabs(s) <= 4.0 ? 0.0 : (double)NAN);
 }
 
-/* gaussian_moments_phi1 for the loops over lanes: no branches. Infinite beyond |s| = 4.0. */
+/* gaussian_moments_phi1 for the loops over lanes: no branches. No number beyond |s| = 4.0. */
 static inline double gaussian_moments_phi1_lane(double s)
 {
     const double ss = s * s;
@@ -663,7 +663,7 @@ static inline double gaussian_moments_phi1_lane(double s)
     sum = sum * ss + 2.48015873015873e-06;
     other = other * ss + 6.613756613756614e-05;
     sum = (sum * s + other) * s + 0.001388888888888889;
-    return sum + (fabs(s) <= 4.0 ? 0.0 : HUGE_VAL);
+    return sum + (fabs(s) <= 4.0 ? 0.0 : (double)NAN);
 }
 
 /* gaussian_moments_linearise in all lanes. */

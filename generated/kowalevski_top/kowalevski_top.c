@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 5bf935f411f0b33a37cbfb6f3a8ff59d74d0ae6e26e834e0cf68140d378cc0e5
+ * body-sha256: 8aa67a8040f4706bab0832dcc029e54094b471c063955e5d94d446b5db34aba9
  */
 #include "kowalevski_top.h"
 
@@ -1379,7 +1379,7 @@ typedef struct {
     kowalevski_top_lanes inverse[36], slope[36], gain[36];
 } kowalevski_top_model;
 
-/* kowalevski_top_phi0 for the loops over lanes: no branches. Infinite beyond |s| = 4.0. */
+/* kowalevski_top_phi0 for the loops over lanes: no branches. No number beyond |s| = 4.0. */
 static inline double kowalevski_top_phi0_lane(double s)
 {
     const double ss = s * s;
@@ -1399,10 +1399,10 @@ static inline double kowalevski_top_phi0_lane(double s)
     sum = sum * ss + 3.306878306878307e-05;
     other = other * ss + 0.001388888888888889;
     sum = (sum * s + other) * s + 0.08333333333333333;
-    return sum + (fabs(s) <= 4.0 ? 0.0 : HUGE_VAL);
+    return sum + (fabs(s) <= 4.0 ? 0.0 : (double)NAN);
 }
 
-/* kowalevski_top_phi1 for the loops over lanes: no branches. Infinite beyond |s| = 4.0. */
+/* kowalevski_top_phi1 for the loops over lanes: no branches. No number beyond |s| = 4.0. */
 static inline double kowalevski_top_phi1_lane(double s)
 {
     const double ss = s * s;
@@ -1422,10 +1422,10 @@ static inline double kowalevski_top_phi1_lane(double s)
     sum = sum * ss + 2.48015873015873e-06;
     other = other * ss + 6.613756613756614e-05;
     sum = (sum * s + other) * s + 0.001388888888888889;
-    return sum + (fabs(s) <= 4.0 ? 0.0 : HUGE_VAL);
+    return sum + (fabs(s) <= 4.0 ? 0.0 : (double)NAN);
 }
 
-/* kowalevski_top_phi2 for the loops over lanes: no branches. Infinite beyond |s| = 4.0. */
+/* kowalevski_top_phi2 for the loops over lanes: no branches. No number beyond |s| = 4.0. */
 static inline double kowalevski_top_phi2_lane(double s)
 {
     const double ss = s * s;
@@ -1445,7 +1445,7 @@ static inline double kowalevski_top_phi2_lane(double s)
     sum = sum * ss + 2.505210838544172e-07;
     other = other * ss + 4.96031746031746e-06;
     sum = (sum * s + other) * s + 6.613756613756614e-05;
-    return sum + (fabs(s) <= 4.0 ? 0.0 : HUGE_VAL);
+    return sum + (fabs(s) <= 4.0 ? 0.0 : (double)NAN);
 }
 
 /* kowalevski_top_linearise_lanes_part1 (part 1 of 3) */

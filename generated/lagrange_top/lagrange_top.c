@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 09548d8a0befa65b6af6d2cc93b9fa62d4f63d699226a3c0f10b836290f8c77f
+ * body-sha256: ed07fbfb1014d7887676ba0c794e4ee6353e9daf67553e015d0c894f934073f0
  */
 #include "lagrange_top.h"
 
@@ -973,7 +973,7 @@ typedef struct {
     lagrange_top_lanes inverse[36], slope[36], gain[36];
 } lagrange_top_model;
 
-/* lagrange_top_phi0 for the loops over lanes: no branches. Infinite beyond |s| = 4.0. */
+/* lagrange_top_phi0 for the loops over lanes: no branches. No number beyond |s| = 4.0. */
 static inline double lagrange_top_phi0_lane(double s)
 {
     const double ss = s * s;
@@ -993,10 +993,10 @@ static inline double lagrange_top_phi0_lane(double s)
     sum = sum * ss + 3.306878306878307e-05;
     other = other * ss + 0.001388888888888889;
     sum = (sum * s + other) * s + 0.08333333333333333;
-    return sum + (fabs(s) <= 4.0 ? 0.0 : HUGE_VAL);
+    return sum + (fabs(s) <= 4.0 ? 0.0 : (double)NAN);
 }
 
-/* lagrange_top_phi1 for the loops over lanes: no branches. Infinite beyond |s| = 4.0. */
+/* lagrange_top_phi1 for the loops over lanes: no branches. No number beyond |s| = 4.0. */
 static inline double lagrange_top_phi1_lane(double s)
 {
     const double ss = s * s;
@@ -1016,10 +1016,10 @@ static inline double lagrange_top_phi1_lane(double s)
     sum = sum * ss + 2.48015873015873e-06;
     other = other * ss + 6.613756613756614e-05;
     sum = (sum * s + other) * s + 0.001388888888888889;
-    return sum + (fabs(s) <= 4.0 ? 0.0 : HUGE_VAL);
+    return sum + (fabs(s) <= 4.0 ? 0.0 : (double)NAN);
 }
 
-/* lagrange_top_phi2 for the loops over lanes: no branches. Infinite beyond |s| = 4.0. */
+/* lagrange_top_phi2 for the loops over lanes: no branches. No number beyond |s| = 4.0. */
 static inline double lagrange_top_phi2_lane(double s)
 {
     const double ss = s * s;
@@ -1039,7 +1039,7 @@ static inline double lagrange_top_phi2_lane(double s)
     sum = sum * ss + 2.505210838544172e-07;
     other = other * ss + 4.96031746031746e-06;
     sum = (sum * s + other) * s + 6.613756613756614e-05;
-    return sum + (fabs(s) <= 4.0 ? 0.0 : HUGE_VAL);
+    return sum + (fabs(s) <= 4.0 ? 0.0 : (double)NAN);
 }
 
 /* lagrange_top_linearise_lanes_part1 (part 1 of 2) */

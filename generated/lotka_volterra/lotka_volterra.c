@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 29e06cc4677c8bb77c44138f8b5758324a41276f3ceeb8563688ef8f62f2f836
+ * body-sha256: af593f7604b07d61ef9140eb7f04ad6fb8737dc462275cf0d56e4b3bc0a58068
  */
 #include "lotka_volterra.h"
 
@@ -489,7 +489,7 @@ typedef struct {
     lotka_volterra_lanes inverse[9], slope[9], gain[9];
 } lotka_volterra_model;
 
-/* exp(u) - 1 for the loops over lanes: u = k log 2 + r, no branches. Infinite beyond |u| = 700.0. */
+/* exp(u) - 1 for the loops over lanes: u = k log 2 + r, no branches. No number beyond |u| = 700.0. */
 static inline double lotka_volterra_expm1_lane(double u)
 {
     const double shifted = u * 1.4426950408889634 + 6755399441055744.0, k = shifted - 6755399441055744.0;
@@ -511,7 +511,7 @@ static inline double lotka_volterra_expm1_lane(double u)
     other = other * rr + 0.16666666666666666;
     sum = (sum * r + other) * r + 0.5;
     sum = sum * rr + r;
-    return power * sum + (power - 1.0) + (fabs(u) <= 700.0 ? 0.0 : HUGE_VAL);
+    return power * sum + (power - 1.0) + (fabs(u) <= 700.0 ? 0.0 : (double)NAN);
 }
 
 /* lotka_volterra_linearise in all lanes. */

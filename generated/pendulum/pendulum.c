@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 8cbc9422c196c0c8528f7c9c61c9570b54be6fd310de4195ce1e68bcdbd68e0f
+ * body-sha256: 3c1f4f2cfb0fcb3ce47ade208b823d63118b3c49daf5445603645a075568164a
  */
 #include "pendulum.h"
 
@@ -483,7 +483,7 @@ typedef struct {
     pendulum_lanes inverse[4], slope[4], gain[4];
 } pendulum_model;
 
-/* sin u for the loops over lanes: u = k pi + r with |r| <= pi/2, no branches. Infinite beyond |u| = 1000000.0. */
+/* sin u for the loops over lanes: u = k pi + r with |r| <= pi/2, no branches. No number beyond |u| = 1000000.0. */
 static inline double pendulum_sin_lane(double u)
 {
     const double shifted = (u * 0.3183098861837907 + 0.0) + 6755399441055744.0;
@@ -505,10 +505,10 @@ static inline double pendulum_sin_lane(double u)
     memcpy(&bits, &value, sizeof bits);
     bits ^= parity << 63;
     memcpy(&value, &bits, sizeof bits);
-    return value + (fabs(u) <= 1000000.0 ? 0.0 : HUGE_VAL);
+    return value + (fabs(u) <= 1000000.0 ? 0.0 : (double)NAN);
 }
 
-/* cos u for the loops over lanes: u = k pi + r with |r| <= pi/2, no branches. Infinite beyond |u| = 1000000.0. */
+/* cos u for the loops over lanes: u = k pi + r with |r| <= pi/2, no branches. No number beyond |u| = 1000000.0. */
 static inline double pendulum_cos_lane(double u)
 {
     const double shifted = (u * 0.3183098861837907 + 0.5) + 6755399441055744.0;
@@ -530,7 +530,7 @@ static inline double pendulum_cos_lane(double u)
     memcpy(&bits, &value, sizeof bits);
     bits ^= parity << 63;
     memcpy(&value, &bits, sizeof bits);
-    return value + (fabs(u) <= 1000000.0 ? 0.0 : HUGE_VAL);
+    return value + (fabs(u) <= 1000000.0 ? 0.0 : (double)NAN);
 }
 
 /* pendulum_linearise in all lanes. */

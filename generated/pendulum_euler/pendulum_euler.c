@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: c839c35defd2e3435db2d4c967102480ced35480c8e6e20669bbf7071f5a2446
+ * body-sha256: 81ad646bea34ab71236419053cc73dccd600e6fa3aa59a87b424d3d053897ded
  */
 #include "pendulum_euler.h"
 
@@ -162,7 +162,7 @@ typedef double pendulum_euler_lanes[pendulum_euler_LANES];
 #define pendulum_euler_EACH_LANE
 #endif
 
-/* sin u for the loops over lanes: u = k pi + r with |r| <= pi/2, no branches. Infinite beyond |u| = 1000000.0. */
+/* sin u for the loops over lanes: u = k pi + r with |r| <= pi/2, no branches. No number beyond |u| = 1000000.0. */
 static inline double pendulum_euler_sin_lane(double u)
 {
     const double shifted = (u * 0.3183098861837907 + 0.0) + 6755399441055744.0;
@@ -184,7 +184,7 @@ static inline double pendulum_euler_sin_lane(double u)
     memcpy(&bits, &value, sizeof bits);
     bits ^= parity << 63;
     memcpy(&value, &bits, sizeof bits);
-    return value + (fabs(u) <= 1000000.0 ? 0.0 : HUGE_VAL);
+    return value + (fabs(u) <= 1000000.0 ? 0.0 : (double)NAN);
 }
 
 /* Members of an ensemble, one in each lane. */

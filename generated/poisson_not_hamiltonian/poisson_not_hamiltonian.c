@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: bba7f7a4c500b85680dde2088f0f15fd9418778cc8bfb00bc1865d5a8842eed1
+ * body-sha256: 5c313b5511bd90bf09435ea8b70acdf707c259074d33492aa55a02bbec588866
  */
 #include "poisson_not_hamiltonian.h"
 
@@ -588,7 +588,7 @@ typedef struct {
     poisson_not_hamiltonian_lanes inverse[9], slope[9], gain[9];
 } poisson_not_hamiltonian_model;
 
-/* exp(u) for the loops over lanes: u = k log 2 + r, no branches. Infinite beyond |u| = 700.0. */
+/* exp(u) for the loops over lanes: u = k log 2 + r, no branches. No number beyond |u| = 700.0. */
 static inline double poisson_not_hamiltonian_exp_lane(double u)
 {
     const double shifted = u * 1.4426950408889634 + 6755399441055744.0, k = shifted - 6755399441055744.0;
@@ -610,10 +610,10 @@ static inline double poisson_not_hamiltonian_exp_lane(double u)
     other = other * rr + 0.16666666666666666;
     sum = (sum * r + other) * r + 0.5;
     sum = sum * rr + r;
-    return power * sum + power + (fabs(u) <= 700.0 ? 0.0 : HUGE_VAL);
+    return power * sum + power + (fabs(u) <= 700.0 ? 0.0 : (double)NAN);
 }
 
-/* sin u for the loops over lanes: u = k pi + r with |r| <= pi/2, no branches. Infinite beyond |u| = 1000000.0. */
+/* sin u for the loops over lanes: u = k pi + r with |r| <= pi/2, no branches. No number beyond |u| = 1000000.0. */
 static inline double poisson_not_hamiltonian_sin_lane(double u)
 {
     const double shifted = (u * 0.3183098861837907 + 0.0) + 6755399441055744.0;
@@ -635,10 +635,10 @@ static inline double poisson_not_hamiltonian_sin_lane(double u)
     memcpy(&bits, &value, sizeof bits);
     bits ^= parity << 63;
     memcpy(&value, &bits, sizeof bits);
-    return value + (fabs(u) <= 1000000.0 ? 0.0 : HUGE_VAL);
+    return value + (fabs(u) <= 1000000.0 ? 0.0 : (double)NAN);
 }
 
-/* cos u for the loops over lanes: u = k pi + r with |r| <= pi/2, no branches. Infinite beyond |u| = 1000000.0. */
+/* cos u for the loops over lanes: u = k pi + r with |r| <= pi/2, no branches. No number beyond |u| = 1000000.0. */
 static inline double poisson_not_hamiltonian_cos_lane(double u)
 {
     const double shifted = (u * 0.3183098861837907 + 0.5) + 6755399441055744.0;
@@ -660,7 +660,7 @@ static inline double poisson_not_hamiltonian_cos_lane(double u)
     memcpy(&bits, &value, sizeof bits);
     bits ^= parity << 63;
     memcpy(&value, &bits, sizeof bits);
-    return value + (fabs(u) <= 1000000.0 ? 0.0 : HUGE_VAL);
+    return value + (fabs(u) <= 1000000.0 ? 0.0 : (double)NAN);
 }
 
 /* poisson_not_hamiltonian_linearise in all lanes. */

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 0cc96e12ef8170ed74268f5e0b0ff68a89491726e67e5b8fad53b9c11e5217ea
+ * body-sha256: 0b7a263b08f9b7345259ce8556e84e45aabc42437e8bf10514b53c84205249a6
  */
 #include "predator_prey.h"
 
@@ -484,7 +484,7 @@ typedef struct {
     predator_prey_lanes inverse[4], slope[4], gain[4];
 } predator_prey_model;
 
-/* exp(u) - 1 for the loops over lanes: u = k log 2 + r, no branches. Infinite beyond |u| = 700.0. */
+/* exp(u) - 1 for the loops over lanes: u = k log 2 + r, no branches. No number beyond |u| = 700.0. */
 static inline double predator_prey_expm1_lane(double u)
 {
     const double shifted = u * 1.4426950408889634 + 6755399441055744.0, k = shifted - 6755399441055744.0;
@@ -506,7 +506,7 @@ static inline double predator_prey_expm1_lane(double u)
     other = other * rr + 0.16666666666666666;
     sum = (sum * r + other) * r + 0.5;
     sum = sum * rr + r;
-    return power * sum + (power - 1.0) + (fabs(u) <= 700.0 ? 0.0 : HUGE_VAL);
+    return power * sum + (power - 1.0) + (fabs(u) <= 700.0 ? 0.0 : (double)NAN);
 }
 
 /* predator_prey_linearise in all lanes. */

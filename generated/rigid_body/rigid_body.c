@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 8745f7cbe5a8c4504f213aedc8e2de14a148e80114e16175ffad9c7c02971bdc
+ * body-sha256: d19f34198ab1e1dfa821f4e614bfd59a5a107d42c01d23b55229f120d93d4ac4
  */
 #include "rigid_body.h"
 
@@ -923,7 +923,7 @@ typedef struct {
     rigid_body_lanes inverse[9], slope[9], gain[9];
 } rigid_body_model;
 
-/* rigid_body_phi0 for the loops over lanes: no branches. Infinite beyond |s| = 4.0. */
+/* rigid_body_phi0 for the loops over lanes: no branches. No number beyond |s| = 4.0. */
 static inline double rigid_body_phi0_lane(double s)
 {
     const double ss = s * s;
@@ -943,10 +943,10 @@ static inline double rigid_body_phi0_lane(double s)
     sum = sum * ss + 3.306878306878307e-05;
     other = other * ss + 0.001388888888888889;
     sum = (sum * s + other) * s + 0.08333333333333333;
-    return sum + (fabs(s) <= 4.0 ? 0.0 : HUGE_VAL);
+    return sum + (fabs(s) <= 4.0 ? 0.0 : (double)NAN);
 }
 
-/* rigid_body_phi1 for the loops over lanes: no branches. Infinite beyond |s| = 4.0. */
+/* rigid_body_phi1 for the loops over lanes: no branches. No number beyond |s| = 4.0. */
 static inline double rigid_body_phi1_lane(double s)
 {
     const double ss = s * s;
@@ -966,7 +966,7 @@ static inline double rigid_body_phi1_lane(double s)
     sum = sum * ss + 2.48015873015873e-06;
     other = other * ss + 6.613756613756614e-05;
     sum = (sum * s + other) * s + 0.001388888888888889;
-    return sum + (fabs(s) <= 4.0 ? 0.0 : HUGE_VAL);
+    return sum + (fabs(s) <= 4.0 ? 0.0 : (double)NAN);
 }
 
 /* rigid_body_linearise in all lanes. */

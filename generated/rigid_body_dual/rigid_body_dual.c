@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: d315a2b8b0bb38d9e58cb99f78857aef8f0327fbb0466447f2c51d8b059ab25d
+ * body-sha256: 590927945748a26440059de30b76f3a6292950dae5adc90545e2a6fc3ce5d9b7
  */
 #include "rigid_body_dual.h"
 
@@ -817,7 +817,7 @@ typedef struct {
     rigid_body_dual_lanes inverse[9], slope[9], gain[9];
 } rigid_body_dual_model;
 
-/* rigid_body_dual_phi0 for the loops over lanes: no branches. Infinite beyond |s| = 4.0. */
+/* rigid_body_dual_phi0 for the loops over lanes: no branches. No number beyond |s| = 4.0. */
 static inline double rigid_body_dual_phi0_lane(double s)
 {
     const double ss = s * s;
@@ -837,10 +837,10 @@ static inline double rigid_body_dual_phi0_lane(double s)
     sum = sum * ss + 3.306878306878307e-05;
     other = other * ss + 0.001388888888888889;
     sum = (sum * s + other) * s + 0.08333333333333333;
-    return sum + (fabs(s) <= 4.0 ? 0.0 : HUGE_VAL);
+    return sum + (fabs(s) <= 4.0 ? 0.0 : (double)NAN);
 }
 
-/* rigid_body_dual_phi1 for the loops over lanes: no branches. Infinite beyond |s| = 4.0. */
+/* rigid_body_dual_phi1 for the loops over lanes: no branches. No number beyond |s| = 4.0. */
 static inline double rigid_body_dual_phi1_lane(double s)
 {
     const double ss = s * s;
@@ -860,7 +860,7 @@ static inline double rigid_body_dual_phi1_lane(double s)
     sum = sum * ss + 2.48015873015873e-06;
     other = other * ss + 6.613756613756614e-05;
     sum = (sum * s + other) * s + 0.001388888888888889;
-    return sum + (fabs(s) <= 4.0 ? 0.0 : HUGE_VAL);
+    return sum + (fabs(s) <= 4.0 ? 0.0 : (double)NAN);
 }
 
 /* rigid_body_dual_linearise in all lanes. */

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: f9c4fa37d9c87ce87abc2d595fb1f6c5b7caee2a9cd8b74e1da8b273a248f3ef
+ * body-sha256: 26992a0bf4beb2848270f5931106abaf3b123eaf901acc81521a33f8144d93ba
  */
 #include "rigid_body_paper.h"
 
@@ -594,7 +594,7 @@ typedef struct {
     rigid_body_paper_lanes inverse[9], slope[9], gain[9];
 } rigid_body_paper_model;
 
-/* rigid_body_paper_phi0 for the loops over lanes: no branches. Infinite beyond |s| = 4.0. */
+/* rigid_body_paper_phi0 for the loops over lanes: no branches. No number beyond |s| = 4.0. */
 static inline double rigid_body_paper_phi0_lane(double s)
 {
     const double ss = s * s;
@@ -614,10 +614,10 @@ static inline double rigid_body_paper_phi0_lane(double s)
     sum = sum * ss + 3.306878306878307e-05;
     other = other * ss + 0.001388888888888889;
     sum = (sum * s + other) * s + 0.08333333333333333;
-    return sum + (fabs(s) <= 4.0 ? 0.0 : HUGE_VAL);
+    return sum + (fabs(s) <= 4.0 ? 0.0 : (double)NAN);
 }
 
-/* rigid_body_paper_phi1 for the loops over lanes: no branches. Infinite beyond |s| = 4.0. */
+/* rigid_body_paper_phi1 for the loops over lanes: no branches. No number beyond |s| = 4.0. */
 static inline double rigid_body_paper_phi1_lane(double s)
 {
     const double ss = s * s;
@@ -637,7 +637,7 @@ static inline double rigid_body_paper_phi1_lane(double s)
     sum = sum * ss + 2.48015873015873e-06;
     other = other * ss + 6.613756613756614e-05;
     sum = (sum * s + other) * s + 0.001388888888888889;
-    return sum + (fabs(s) <= 4.0 ? 0.0 : HUGE_VAL);
+    return sum + (fabs(s) <= 4.0 ? 0.0 : (double)NAN);
 }
 
 /* rigid_body_paper_linearise in all lanes. */

@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 4ab166e24271851752f9811e3adc1b504b75f1a602e5f4b600ce1269752b71ce
+ * body-sha256: 1862dc8ec77bbcff0ca1162d3a04436732cdca7ddfb1efc3d8d01ada0c646dda
  */
 #include "so4_manakov.h"
 
@@ -1242,7 +1242,7 @@ typedef struct {
     so4_manakov_lanes inverse[36], slope[36], gain[36];
 } so4_manakov_model;
 
-/* so4_manakov_phi0 for the loops over lanes: no branches. Infinite beyond |s| = 4.0. */
+/* so4_manakov_phi0 for the loops over lanes: no branches. No number beyond |s| = 4.0. */
 static inline double so4_manakov_phi0_lane(double s)
 {
     const double ss = s * s;
@@ -1262,10 +1262,10 @@ static inline double so4_manakov_phi0_lane(double s)
     sum = sum * ss + 3.306878306878307e-05;
     other = other * ss + 0.001388888888888889;
     sum = (sum * s + other) * s + 0.08333333333333333;
-    return sum + (fabs(s) <= 4.0 ? 0.0 : HUGE_VAL);
+    return sum + (fabs(s) <= 4.0 ? 0.0 : (double)NAN);
 }
 
-/* so4_manakov_phi1 for the loops over lanes: no branches. Infinite beyond |s| = 4.0. */
+/* so4_manakov_phi1 for the loops over lanes: no branches. No number beyond |s| = 4.0. */
 static inline double so4_manakov_phi1_lane(double s)
 {
     const double ss = s * s;
@@ -1285,7 +1285,7 @@ static inline double so4_manakov_phi1_lane(double s)
     sum = sum * ss + 2.48015873015873e-06;
     other = other * ss + 6.613756613756614e-05;
     sum = (sum * s + other) * s + 0.001388888888888889;
-    return sum + (fabs(s) <= 4.0 ? 0.0 : HUGE_VAL);
+    return sum + (fabs(s) <= 4.0 ? 0.0 : (double)NAN);
 }
 
 /* so4_manakov_linearise_lanes_part1 (part 1 of 3) */

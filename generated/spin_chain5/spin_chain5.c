@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 49fa3f2572ba3b8364d26075846b633c41d97d39df9dcd86243b3b5a824d6836
+ * body-sha256: 28bf065edf5d306832bd3d341b44ffb1d4b0ca8e5e03fb2d610b829e27626765
  */
 #include "spin_chain5.h"
 
@@ -2633,7 +2633,7 @@ typedef struct {
     spin_chain5_lanes inverse[225], slope[225], gain[225];
 } spin_chain5_model;
 
-/* spin_chain5_phi0 for the loops over lanes: no branches. Infinite beyond |s| = 4.0. */
+/* spin_chain5_phi0 for the loops over lanes: no branches. No number beyond |s| = 4.0. */
 static inline double spin_chain5_phi0_lane(double s)
 {
     const double ss = s * s;
@@ -2653,10 +2653,10 @@ static inline double spin_chain5_phi0_lane(double s)
     sum = sum * ss + 3.306878306878307e-05;
     other = other * ss + 0.001388888888888889;
     sum = (sum * s + other) * s + 0.08333333333333333;
-    return sum + (fabs(s) <= 4.0 ? 0.0 : HUGE_VAL);
+    return sum + (fabs(s) <= 4.0 ? 0.0 : (double)NAN);
 }
 
-/* spin_chain5_phi1 for the loops over lanes: no branches. Infinite beyond |s| = 4.0. */
+/* spin_chain5_phi1 for the loops over lanes: no branches. No number beyond |s| = 4.0. */
 static inline double spin_chain5_phi1_lane(double s)
 {
     const double ss = s * s;
@@ -2676,7 +2676,7 @@ static inline double spin_chain5_phi1_lane(double s)
     sum = sum * ss + 2.48015873015873e-06;
     other = other * ss + 6.613756613756614e-05;
     sum = (sum * s + other) * s + 0.001388888888888889;
-    return sum + (fabs(s) <= 4.0 ? 0.0 : HUGE_VAL);
+    return sum + (fabs(s) <= 4.0 ? 0.0 : (double)NAN);
 }
 
 /* spin_chain5_linearise_lanes_part1 (part 1 of 7) */

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: b3c959b046ac15bbc0513ba6d3b23a444be62c5c35859b49760cfac39f781e4e
+ * body-sha256: 487e1194baad18af298b5ac337aee317f73bd1dfd93bc72065f98f5d6386c588
  */
 #include "toda3.h"
 
@@ -668,7 +668,7 @@ typedef struct {
     toda3_lanes inverse[25], slope[25], gain[25];
 } toda3_model;
 
-/* toda3_phi0 for the loops over lanes: no branches. Infinite beyond |s| = 4.0. */
+/* toda3_phi0 for the loops over lanes: no branches. No number beyond |s| = 4.0. */
 static inline double toda3_phi0_lane(double s)
 {
     const double ss = s * s;
@@ -688,10 +688,10 @@ static inline double toda3_phi0_lane(double s)
     sum = sum * ss + 3.306878306878307e-05;
     other = other * ss + 0.001388888888888889;
     sum = (sum * s + other) * s + 0.08333333333333333;
-    return sum + (fabs(s) <= 4.0 ? 0.0 : HUGE_VAL);
+    return sum + (fabs(s) <= 4.0 ? 0.0 : (double)NAN);
 }
 
-/* toda3_phi1 for the loops over lanes: no branches. Infinite beyond |s| = 4.0. */
+/* toda3_phi1 for the loops over lanes: no branches. No number beyond |s| = 4.0. */
 static inline double toda3_phi1_lane(double s)
 {
     const double ss = s * s;
@@ -711,7 +711,7 @@ static inline double toda3_phi1_lane(double s)
     sum = sum * ss + 2.48015873015873e-06;
     other = other * ss + 6.613756613756614e-05;
     sum = (sum * s + other) * s + 0.001388888888888889;
-    return sum + (fabs(s) <= 4.0 ? 0.0 : HUGE_VAL);
+    return sum + (fabs(s) <= 4.0 ? 0.0 : (double)NAN);
 }
 
 /* toda3_linearise in all lanes. */

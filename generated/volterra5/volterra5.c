@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 9899acc70c8414ab711fcee45a0d9110e60860174afae8a7f5250d25400af872
+ * body-sha256: 2f0933d5f1f245ab40f2cb29d01ca5b5bece6f7676a5e2bdd7f3f7ef3f72a59e
  */
 #include "volterra5.h"
 
@@ -578,7 +578,7 @@ typedef struct {
     volterra5_lanes inverse[25], slope[25], gain[25];
 } volterra5_model;
 
-/* exp(u) - 1 for the loops over lanes: u = k log 2 + r, no branches. Infinite beyond |u| = 700.0. */
+/* exp(u) - 1 for the loops over lanes: u = k log 2 + r, no branches. No number beyond |u| = 700.0. */
 static inline double volterra5_expm1_lane(double u)
 {
     const double shifted = u * 1.4426950408889634 + 6755399441055744.0, k = shifted - 6755399441055744.0;
@@ -600,7 +600,7 @@ static inline double volterra5_expm1_lane(double u)
     other = other * rr + 0.16666666666666666;
     sum = (sum * r + other) * r + 0.5;
     sum = sum * rr + r;
-    return power * sum + (power - 1.0) + (fabs(u) <= 700.0 ? 0.0 : HUGE_VAL);
+    return power * sum + (power - 1.0) + (fabs(u) <= 700.0 ? 0.0 : (double)NAN);
 }
 
 /* volterra5_linearise in all lanes. */

@@ -140,3 +140,13 @@ def test_threads_change_no_bit(name, tmp_path):
     assert printed[0] == printed[1]
     assert printed[0].splitlines()[0] == "4"
     assert len(set(printed[0].splitlines())) > 90
+
+
+@pytest.mark.parametrize("scheme", ["series", "splitting"])
+def test_what_lanes_cannot_compute_is_not_taken_for_infinite(scheme):
+    """exp(-800) is 0, but out of reach in a lane: taken for infinite, the force would be 0, and the step no failure."""
+    text = "coordinates: [q, p, c]\npoisson: {brackets: {q: {p: 1}}}\nhamiltonian: p**2/2 + q/(1 + exp(c))\norder: 2\n"
+    compilation = compile_text(text, scheme=scheme)
+    assert compilation.program.driver in ("explicit", "splitting")
+    ends = solver(compilation, "c").ensemble([[0.0, 0.0, -800.0], [0.0, 0.0, 0.0]], 0.125, 64)
+    np.testing.assert_allclose(ends, [[-32, -8, -800], [-16, -4, 0]], rtol=1e-14)

@@ -27,7 +27,7 @@ int main(void)
         }}
     }}
     printf("%.2f", worst);
-    return isfinite(t_{name}_lane(2.0 * REACH)) || isfinite(t_{name}_lane(-2.0 * REACH));
+    return !isnan(t_{name}_lane(2.0 * REACH)) || !isnan(t_{name}_lane(-2.0 * REACH));
 }}
 """
 
@@ -35,7 +35,7 @@ int main(void)
 @pytest.mark.parametrize("flags", ["-O0", "-O3 -march=native -ffp-contract=fast"])
 @pytest.mark.parametrize("name", RANGES)
 def test_lane_functions_agree_with_the_library(name, flags, tmp_path):
-    """Over the whole range and, closer together, near 0; infinite beyond the range, so that blocks there fail."""
+    """Over the whole range and, closer together, near 0; no number beyond it, so that steps there are made singly."""
     reach, units = RANGES[name]
     program = compiled("pendulum").program
     code = "\n".join(lane_functions(program, {name})).replace("pendulum_", "t_")
