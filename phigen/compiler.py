@@ -20,12 +20,12 @@ from phigen.geometry.system import System, system_from_spec
 from phigen.realisations.catalogue import realise
 from phigen.realisations.protocol import BiRealisation
 from phigen.scheme.assemble import build_program
+from phigen.scheme.choosing import plan as plan_splitting
 from phigen.scheme.discretisation import series_of
 from phigen.scheme.gauge import Gauge, choose, given
 from phigen.scheme.order import Order, plan_order
 from phigen.scheme.program import Program
-from phigen.scheme.splitting import arranged, build_splitting
-from phigen.scheme.splitting import plan as plan_splitting
+from phigen.scheme.splitting import build_splitting
 from phigen.series.hamilton_jacobi import PolynomialSeries
 from phigen.spec.model import Extras, Spec
 from phigen.splitting.parts import Splitting, split
@@ -118,11 +118,14 @@ def compile_spec(
 def _split(spec: Spec, source: System, order: int | None, described: Mapping[str, Any], clock: _Clock) -> Compilation:
     """Compile to a splitting."""
     gauge = Gauge() if isinstance(spec.gauge, str) else given(source, spec.gauge)
-    splitting = clock.timed("splitting", lambda: arranged(split(gauge.applied(source))))
-    plan, method = plan_splitting(source, order or spec.order, spec.composition)
+    discretised = gauge.applied(source)
+    parts = clock.timed("splitting", lambda: split(discretised))
+    choice = clock.timed(
+        "composition", lambda: plan_splitting(discretised, parts, order or spec.order, spec.composition)
+    )
     described = {**described, "lanes": spec.solver.lanes}
-    program = clock.timed("program", lambda: build_splitting(source, splitting, plan, method, gauge, **described))
-    return Compilation(spec, source, None, plan, program, gauge, clock.seconds, splitting)
+    program = clock.timed("program", lambda: build_splitting(source, choice, gauge, **described))
+    return Compilation(spec, source, None, choice.order, program, gauge, clock.seconds, choice.splitting)
 
 
 class _Clock:

@@ -81,16 +81,13 @@ def gauge_of(curve: Curve) -> str:
 
 def scheme_of(curve: Curve) -> str:
     """How the order is reached."""
-    from phigen.scheme import alternation
-
     if curve.setting is None:
         return "explicit"
     composition = curve.setting.composition
     if curve.stages == 0:
         return "exact flow"
-    if curve.setting.is_splitting and composition == "auto":
-        found = alternation.find(composition, curve.order)
-        composition = found.name if found else composition
+    if curve.setting.is_splitting:
+        composition = curve.composition
     return f"{composition}, {curve.stages} stages" if composition not in ("none", "auto") else "direct"
 
 

@@ -83,11 +83,13 @@ class Schedule:
     """The flows of one step: part 0 for ``times[0]``, then ``stages`` times the ``pattern``.
 
     The pattern lists parts with the row of ``times`` that each takes, counted from the first row of the stage.
+    Kicks with modified potential have a multiple each, in units of h²: ``multiples`` by row, 0 for other flows.
     """
 
     times: tuple[float, ...]
     stages: int
     pattern: tuple[tuple[int, int], ...]
+    multiples: tuple[float, ...] = ()
 
     @property
     def rows(self) -> int:

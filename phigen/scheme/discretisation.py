@@ -13,6 +13,7 @@ from phigen.scheme.composition import find, orders
 from phigen.scheme.generating import STEP, GeneratingFunction, collected_form, graph_form
 from phigen.scheme.order import Order
 from phigen.series.hamilton_jacobi import PolynomialSeries, graph_series, polynomial_series
+from phigen.spec.names import FLOW_COMPOSITIONS
 from phigen.symbolic.expression import Expression
 
 #: Most operations in one kernel; about 5 MB of C and a minute of compilation.
@@ -108,7 +109,7 @@ def _composed(
     if found is None or not realisation.symmetric:
         reason = (
             f"composition {name} composes the parts of a splitting; it needs scheme: splitting"
-            if name == "blanes-moan"
+            if name in FLOW_COMPOSITIONS
             else f"composition {name} offers the orders {orders(name)}, not {order.order}"
             if realisation.symmetric
             else f"composition {name} needs a symmetric bi-realisation; {realisation.kind} is not"

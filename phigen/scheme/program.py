@@ -52,10 +52,10 @@ class Program:
     """A solver, ready to be printed. ``driver`` is ``newton``, ``explicit``, ``path`` or ``splitting``.
 
     ``schedule`` lists the flows of a step of a splitting, whose kernels are ``flow1``, ``flow2``, …; there is a table
-    of coefficients for each row of the schedule. ``path`` holds the recurrences of a path driver. A step of size h is
-    the composition of one step of each of the ``fractions`` of h. ``tangent_path`` is the path with its variation
-    (`phigen.scheme.tangent`), if ``extras`` ask for the tangent map. ``gauge`` names the Casimirs whose multiple the
-    solver chooses for each trajectory.
+    of coefficients for each row of the schedule; ``composition`` is its name. ``path`` holds the recurrences of a path
+    driver. A step of size h is the composition of one step of each of the ``fractions`` of h. ``tangent_path`` is the
+    path with its variation (`phigen.scheme.tangent`), if ``extras`` ask for the tangent map. ``gauge`` names the
+    Casimirs whose multiple the solver chooses for each trajectory.
 
     ``relative`` tells that the coordinates are positive or keep their sign (log-canonical π), so that errors
     of the inner solve count relative to each coordinate. ``facts`` are the lines of the header.
@@ -72,6 +72,7 @@ class Program:
     kernels: Mapping[str, Kernel]
     path: Path | None = None
     schedule: Schedule | None = None
+    composition: str = ""
     fractions: tuple[float, ...] = (1.0,)
     gauge: tuple[str, ...] = ()
     extras: Extras = NO_EXTRAS

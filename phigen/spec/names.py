@@ -76,7 +76,18 @@ BIREALISATIONS = (
     "custom",
 )
 POISSON_FORMS = ("matrix", "brackets", "canonical", "log_canonical", "lie_algebra", "nambu", "product", "pullback")
-COMPOSITIONS = ("auto", "none", "suzuki", "triple-jump", "kahan-li", "yoshida", "sofroniou-spaletta", "blanes-moan")
+#: Compositions of the flows of the parts of a splitting, and all.
+FLOW_COMPOSITIONS = ("blanes-moan", "blanes-moan-rkn", "force-gradient")
+COMPOSITIONS = (
+    "auto",
+    "none",
+    "suzuki",
+    "triple-jump",
+    "kahan-li",
+    "yoshida",
+    "sofroniou-spaletta",
+    *FLOW_COMPOSITIONS,
+)
 SCHEMES = ("auto", "series", "splitting")
 PLANNED: dict[str, tuple[str, ...]] = {
     "birealisation": (),

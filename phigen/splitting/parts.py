@@ -21,9 +21,14 @@ ROUNDS = 3
 
 @dataclass(frozen=True)
 class Splitting:
-    """The flows of the parts of H, in the order of a step."""
+    """The flows of the parts of H, in the order of a step.
+
+    ``kick`` is the index of the part V if the method rests on {V, {V, {V, T}}} = 0 (`phigen.splitting.kicks`); then a
+    multiple of {V, {V, T}} may be in the Hamiltonian of its flow.
+    """
 
     flows: tuple[Flow, ...]
+    kick: int | None = None
 
 
 def split(system: System) -> Splitting:

@@ -21,6 +21,9 @@ from phigen.symbolic.tower import Poly, Tower, rational
 #: The time of a flow, as a symbol: the step size of the solver.
 TIME = "h:"
 
+#: The multiple κ of {V, {V, T}} in a kick with modified potential, as a symbol: see `phigen.splitting.kicks`.
+KICK = "κ:"
+
 #: Exponents of some of the ring's variables.
 Monomial = tuple[int, ...]
 
@@ -124,11 +127,11 @@ class Ring:
         return horner(collected, [self.values[i] for i in self.state])
 
 
-def ring_of(system: System, more: Iterable[Expression] = ()) -> Ring:
-    """The ring of a system, with the time and whatever else occurs in the expressions ``more``."""
+def ring_of(system: System, more: Iterable[Expression] = (), symbols: Sequence[str] = ()) -> Ring:
+    """The ring of a system, with the time, further static ``symbols``, and what occurs in the expressions ``more``."""
     listed = list(more)
     roots = [system.hamiltonian, *listed, *(e for row in system.poisson for e in row)]
-    tower = Tower([*system.coordinates, *system.parameter_names, TIME], roots, system.coordinates)
+    tower = Tower([*system.coordinates, *system.parameter_names, *symbols, TIME], roots, system.coordinates)
     images = tower.convert_all(roots)
     n, start = system.dimension, 1 + len(listed)
     poisson = tuple(tuple(images[start + i * n : start + (i + 1) * n]) for i in range(n))

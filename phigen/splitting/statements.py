@@ -6,12 +6,12 @@ order of the composition, whatever the parts are.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from phigen.geometry.system import System, hamiltonian_vector_field
 from phigen.splitting.flow import Flow
 from phigen.splitting.parts import Splitting
-from phigen.splitting.ring import TIME
+from phigen.splitting.ring import KICK, TIME
 from phigen.symbolic.expression import (
     ZERO,
     Expression,
@@ -30,10 +30,35 @@ from phigen.symbolic.verdict import Statement, decide_zero
 def check(system: System, splitting: Splitting) -> Iterator[Statement]:
     """The statements, those on flows in the order of the parts; H is that of the system, any gauge applied."""
     flows = splitting.flows
-    name = "H = " + " + ".join(f"H_{k}" for k in range(1, len(flows) + 1))
-    yield decide_zero(name, [("", system.hamiltonian - total(f.hamiltonian for f in flows))], system.positive)
+    plain = substitute([f.hamiltonian for f in flows], {KICK: ZERO})
+    modified = plain != [f.hamiltonian for f in flows]
+    name = "H = " + " + ".join(f"H_{k}" for k in range(1, len(flows) + 1)) + " at κ = 0" * modified
+    yield decide_zero(name, [("", system.hamiltonian - total(plain))], system.positive)
     for k, flow in enumerate(flows, 1):
         yield _flow_statement(system, flow, k)
+    if splitting.kick is not None:
+        yield from _kick_statements(system, splitting, plain)
+
+
+def _kick_statements(system: System, splitting: Splitting, plain: Sequence[Expression]) -> Iterator[Statement]:
+    """{V, {V, {V, T}}} = 0, and that {V, {V, T}} is what κ multiplies."""
+    assert splitting.kick is not None
+    v, t = plain[splitting.kick], plain[1 - splitting.kick]
+    name_v, name_t = f"H_{1 + splitting.kick}", f"H_{2 - splitting.kick}"
+    twice = _bracket(system, v, _bracket(system, v, t))
+    name = f"{{{name_v}, {{{name_v}, {{{name_v}, {name_t}}}}}}} = 0"
+    yield decide_zero(name, [("", _bracket(system, v, twice))], system.positive)
+    (multiplied,) = derivatives([splitting.flows[splitting.kick].hamiltonian], KICK)
+    if not multiplied.is_zero:
+        name = f"d{name_v}/dκ = {{{name_v}, {{{name_v}, {name_t}}}}}"
+        yield decide_zero(name, [("", multiplied - twice)], system.positive)
+
+
+def _bracket(system: System, f: Expression, g: Expression) -> Expression:
+    """{f, g} = ∇f·π∇g."""
+    names = system.coordinates
+    field = hamiltonian_vector_field(system.poisson, gradient(g, names))
+    return total(a * b for a, b in zip(gradient(f, names), field, strict=True))
 
 
 def _angles_added(e: Expression) -> Expression:

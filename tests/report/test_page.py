@@ -114,7 +114,7 @@ def test_page_of_a_splitting_shows_its_flows():
     compilation = compile_spec(compiled("henon_heiles").spec, scheme="splitting")
     text = bare(compilation)
     assert Page(text).errors == []
-    assert "The 21 flows of one step" in text
+    assert "The 29 flows of one step" in text
     assert "Bi-realisation" not in text
 
 

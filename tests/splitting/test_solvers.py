@@ -11,11 +11,12 @@ from phigen.analysis import measures
 from phigen.analysis.methods import of_solver
 from phigen.analysis.proof import examine
 from phigen.analysis.verification import verify
-from phigen.compiler import emit
+from phigen.compiler import compile_spec, emit
 from phigen.errors import CheckError, StepError
-from phigen.scheme.alternation import find
+from phigen.scheme.choosing import plan
 from phigen.scheme.splitting import build_splitting
 from phigen.spec.model import Extras
+from phigen.splitting.parts import split
 
 SYSTEMS = ["rigid_body", "kowalevski_top", "lotka_volterra", "toda3", "henon_heiles", "charged_particle"]
 TANGENT = Extras(tangent=True)
@@ -26,10 +27,7 @@ ROD = PLANE + "parameters: {g: 1}\nhamiltonian: p**2/2 - g*cos(q)\n"
 
 def splitting_of(name, order):
     """The solver of a system of the corpus as a splitting, with its tangent map."""
-    found = compiled(name, order, "splitting")
-    method = find("auto", order)
-    program = build_splitting(found.system, found.splitting, found.order, method, found.gauge, extras=TANGENT)
-    return replace(found, program=program)
+    return compile_spec(compiled(name, order, "splitting").spec, order=order, scheme="splitting", extras=TANGENT)
 
 
 #: Times over which errors are between those of rounding and 1.
@@ -45,7 +43,10 @@ def test_observed_order_is_the_stated_one(name, order):
     fine = reference.integrate(at.x, span / 1024, 1024, parameters=at.parameters).x[-1]
 
     def error(steps):
-        end = solve.integrate(at.x, span / steps, steps, parameters=at.parameters).x[-1]
+        try:
+            end = solve.integrate(at.x, span / steps, steps, parameters=at.parameters).x[-1]
+        except StepError:  # the largest steps may be too large
+            return np.inf
         return np.max(np.abs(end - fine)) / np.max(np.abs(fine))
 
     errors = [error(n) for n in (4, 8, 16, 32, 64, 128)]
@@ -107,8 +108,8 @@ def test_a_wrong_sign_in_one_flow_falls_short_of_the_order():
     flow = found.splitting.flows[0]
     wrong = replace(flow, increment=tuple(-e for e in flow.increment))
     planted = replace(found.splitting, flows=(wrong, *found.splitting.flows[1:]))
-    method = find("auto", 4)
-    program = build_splitting(found.system, planted, found.order, method, found.gauge, extras=TANGENT)
+    choice = replace(plan(found.system, split(found.system), 4, "auto"), splitting=planted)
+    program = build_splitting(found.system, choice, found.gauge, extras=TANGENT)
     bad = replace(found, program=program, splitting=planted)
     solvers = {target: solver(bad, target) for target in TARGETS}
     verified = verify(bad, solvers, "planted", at.x, at.parameters, at.h, 100, quick=True)

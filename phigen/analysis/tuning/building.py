@@ -49,6 +49,7 @@ class Built:
     symmetric: bool
     gauged: bool
     stages: int
+    composition: str
     seconds: float
 
     @property
@@ -89,7 +90,7 @@ def built(compilation: Compilation, setting: Setting, start: float) -> Built:
     stages = program.schedule.stages if program.schedule else len(program.fractions)
     return Built(
         setting, files, interface_of(program), compilation.label, program.order, compilation.exact,
-        compilation.symmetric, bool(program.gauge), stages,
+        compilation.symmetric, bool(program.gauge), stages, program.composition,
         time.perf_counter() - start,
     )  # fmt: skip
 

@@ -44,6 +44,7 @@ class Curve:
     symmetric: bool = True
     bounded: bool = True
     stages: int = 1
+    composition: str = ""
     seconds: float = 0.0
 
     @property

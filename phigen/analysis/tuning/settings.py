@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from phigen.compiler import Compilation
 from phigen.geometry.shapes import Affine, Canonical, Constant, LiePoisson
 from phigen.geometry.system import System
-from phigen.scheme import alternation
+from phigen.scheme import choosing
 from phigen.scheme.composition import COMPOSITIONS
 from phigen.spec import limits
 from phigen.spec.model import BirealisationChoice, Spec
@@ -55,7 +55,7 @@ class Setting:
     def orders(self) -> tuple[int, ...]:
         """The orders there are in its family."""
         if self.is_splitting:
-            return tuple(alternation.orders(self.composition))
+            return tuple(choosing.orders(self.composition))
         if self.composition not in ("none", "auto"):
             return tuple(c.order for c in COMPOSITIONS if c.name == self.composition)
         return (1, *ORDERS) if self.kind == "canonical-euler" else ORDERS

@@ -110,7 +110,8 @@ class Tuner:
         points = self._scanned(method, made.order, worth, bounded=made.exact)
         curve = Curve(
             made.kind, made.order, points, setting,
-            gauged=made.gauged, symmetric=made.symmetric, bounded=made.exact, stages=made.stages, seconds=made.seconds,
+            gauged=made.gauged, symmetric=made.symmetric, bounded=made.exact, stages=made.stages,
+            composition=made.composition, seconds=made.seconds,
         )  # fmt: skip
         self.tried[setting], self.methods[setting] = curve, method
         return curve

@@ -23,7 +23,9 @@ def pieces(program: Program, values: Mapping[str, object]) -> list[str]:
         found.append(
             render("c", "flow.c", own | {"k": k, "moved": list(enumerate(moved)), "count": max(1, len(moved))})
         )
-    return [*found, render("c", "splitting.c", own | {"step": _step(program, schedule, "", "x, carry")})]
+    rows = "rows_kicks.c" if schedule.multiples else "rows.c"
+    step = _step(program, schedule, "", "x, carry")
+    return [*found, render("c", rows, own), render("c", "splitting.c", own | {"step": step})]
 
 
 def in_lanes(program: Program, values: Mapping[str, object], form: str, functions: Mapping[str, str]) -> list[str]:
@@ -72,10 +74,12 @@ def _flows(program: Program) -> list[str]:
 
 
 def _values(program: Program) -> dict[str, object]:
-    times = schedule_of(program).times
+    schedule = schedule_of(program)
+    times = schedule.times
     return {
         "rows": len(times),
         "times": ", ".join(repr(t) for t in times),
+        "multiples": ", ".join(repr(m) for m in schedule.multiples),
         "row": max(1, program.coefficients // len(times)),
     }
 

@@ -86,7 +86,9 @@ def _driver(program: Program) -> list[str]:
     if program.schedule:
         row = _function(program, replace(kernels["prepare"], name="prepare_row"))
         flows = [_function(program, kernel) for name, kernel in kernels.items() if name.startswith("flow")]
-        return [row, *flows, render("numpy", "splitting.py", values | _splitting_values(program, program.schedule))]
+        own = values | _splitting_values(program, program.schedule)
+        rows = "rows_kicks.py" if program.schedule.multiples else "rows.py"
+        return [row, *flows, render("numpy", "splitting.py", own), render("numpy", rows, own)]
     prepare = _function(program, kernels["prepare"])
     if program.driver == "explicit":
         return [prepare, _function(program, kernels["explicit"]), render("numpy", "explicit.py", values)]
@@ -103,6 +105,7 @@ def _splitting_values(program: Program, schedule: Schedule) -> dict[str, object]
     count = sum(name.startswith("flow") for name in program.kernels)
     return {
         "times": "(" + "".join(f"{t!r}, " for t in schedule.times).rstrip() + ")",
+        "multiples": "(" + "".join(f"{m!r}, " for m in schedule.multiples).rstrip() + ")",
         "row": program.coefficients // len(schedule.times),
         "schedule": repr(tuple(schedule.flows)),
         "flows": ", ".join(f"_flow{k}" for k in range(1, count + 1)),

@@ -1,0 +1,141 @@
+"""Which composition a splitting gets: by the order, by what holds for its parts, and by what its flows cost.
+
+Where {V, {V, {V, T}}} = 0 for one of two parts as V, the methods of `phigen.scheme.nystrom` apply, with modified kicks
+where these have a flow. Of all that apply the one is taken with the least cost of a step times error^{1/order}: what a
+given accuracy costs. All others take the recommended alternation of the order.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from phigen.errors import Diagnostic, SpecError
+from phigen.geometry.system import System
+from phigen.scheme import alternation, nystrom
+from phigen.scheme.alternation import Alternation, Schedule
+from phigen.scheme.lowering import cost
+from phigen.scheme.nystrom import Nystrom
+from phigen.scheme.order import Order
+from phigen.splitting.flow import Flow
+from phigen.splitting.kicks import Kick, kicks
+from phigen.splitting.parts import Splitting
+
+#: Operations of one addition in compensated arithmetic, for each coordinate that a flow moves.
+ADDITION = 7
+
+
+@dataclass(frozen=True)
+class Choice:
+    """A method with the flows in the order of its steps, kicks modified if it wants that; ``why`` is for the user."""
+
+    order: Order
+    method: Alternation | Nystrom
+    splitting: Splitting
+    why: str = ""
+
+    def schedule(self) -> Schedule:
+        """The flows of a step."""
+        if isinstance(self.method, Nystrom):
+            return self.method.schedule()
+        return alternation.schedule(self.method, len(self.splitting.flows))
+
+
+def plan(system: System, splitting: Splitting, order: int | None, composition: str) -> Choice:
+    """The method that gives an order; odd orders round up.
+
+    Raises `SpecError` for orders that the composition lacks, and for parts that it does not apply to.
+    """
+    wanted = order or 2
+    even = wanted + wanted % 2
+    note = "" if even == wanted else f"order {wanted} was asked for; a symmetric method has even order"
+    planned = Order(even, 0, note)
+    named = composition in nystrom.NAMES
+    if named or composition == "auto":
+        found = list(_applicable(system, splitting, even, composition))
+        if found:
+            method, kick = min(found, key=lambda pair: _price(splitting, *pair))
+            return chosen(splitting, planned, method, kick)
+    known = orders(composition)
+    if even not in known:
+        raise _no_order(system, composition, known, even)
+    if named:
+        raise _not_applicable(system, splitting, composition)
+    recommended = alternation.find(composition, even)
+    assert recommended is not None
+    return Choice(planned, recommended, arranged(splitting))
+
+
+def chosen(splitting: Splitting, order: Order, method: Nystrom, kick: Kick) -> Choice:
+    """The choice of a method of Nyström type."""
+    return Choice(order, method, _arranged(splitting, method, kick), _why(method))
+
+
+def orders(composition: str) -> list[int]:
+    """The orders that a name offers."""
+    return nystrom.orders(composition) if composition in nystrom.NAMES else alternation.orders(composition)
+
+
+def arranged(splitting: Splitting) -> Splitting:
+    """The parts in the order in which an alternation is cheapest: the costliest last, since it occurs once in a stage.
+
+    The first occurs once too, and once more in all; those in the middle occur twice.
+    """
+    by_cost = sorted(splitting.flows, key=lambda flow: cost(flow.increment))
+    return Splitting((*by_cost[-2:-1], *by_cost[:-2], *by_cost[-1:]))
+
+
+def _applicable(system: System, splitting: Splitting, order: int, name: str) -> Iterator[tuple[Nystrom, Kick]]:
+    methods = [m for m in nystrom.METHODS if m.order == order and name in ("auto", m.name)]
+    for kick in kicks(system, splitting) if methods else ():
+        for method in methods:
+            if kick.modified or not method.multiples:
+                yield method, kick
+
+
+def _price(splitting: Splitting, method: Nystrom, kick: Kick) -> float:
+    """What a step costs, times error^{1/order}: in proportion to the cost of a time at a given accuracy."""
+    first, last = (_cost(flow) for flow in _arranged(splitting, method, kick).flows)
+    step = (method.stages + 1) * first + method.stages * last
+    return step * math.pow(method.error, 1 / method.order)
+
+
+def _cost(flow: Flow) -> int:
+    return cost(flow.increment) + ADDITION * flow.moving
+
+
+def _arranged(splitting: Splitting, method: Nystrom, kick: Kick) -> Splitting:
+    """T and V in the order of the method."""
+    drift, plain = splitting.flows[1 - kick.part], splitting.flows[kick.part]
+    kicking = kick.modified if method.multiples and kick.modified else plain
+    return Splitting((kicking, drift), 0) if method.kicks_first else Splitting((drift, kicking), 1)
+
+
+def _why(method: Nystrom) -> str:
+    """What makes a method apply."""
+    v, t = ("H_1", "H_2") if method.kicks_first else ("H_2", "H_1")
+    modified = f" and {v} + κ{{{v}, {{{v}, {t}}}}} has a flow" if method.multiples else ""
+    return f"{{{v}, {{{v}, {{{v}, {t}}}}}}} = 0{modified}"
+
+
+def _no_order(system: System, composition: str, known: Sequence[int], order: int) -> SpecError:
+    place = system.locations.get(("composition",)) or system.locations.get(("order",))
+    offered = ", ".join(map(str, known)) or "none"
+    who = "splittings offer" if composition == "auto" else f"composition {composition} offers"
+    message = f"scheme splitting: {who} the orders {offered}, not {order}"
+    return SpecError([Diagnostic(message, place, "scheme: series reaches order 16")])
+
+
+def _not_applicable(system: System, splitting: Splitting, composition: str) -> SpecError:
+    """Why a method for kicks does not apply."""
+    count = len(splitting.flows)
+    if count != 2:
+        reason = f"H = T + V, of two parts; here there {'is one' if count == 1 else f'are {count}'}"
+    elif kicks(system, splitting):
+        reason = "a flow of V + κ{V, {V, T}} in closed form, which phigen does not find"
+    else:
+        reason = "{V, {V, {V, T}}} = 0 with one of the two parts as V, which does not hold here"
+    hint = "composition: auto takes the best that applies; phigen show --scheme splitting shows the parts"
+    place = system.locations.get(("composition",))
+    return SpecError([Diagnostic(f"scheme splitting: composition {composition} needs {reason}", place, hint)])
