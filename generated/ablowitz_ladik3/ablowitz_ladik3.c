@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 2f99e6afd123b740963b7e057131352c4062aa81da77bece0deb03d1683e81cd
+ * body-sha256: 446df0ff527ef5c32d81d6d08d14b2b06a55071b8c9c5e5f461ddc429b038ddd
  */
 #include "ablowitz_ladik3.h"
 
@@ -167,7 +167,7 @@ static int ablowitz_ladik3_near(const double guess[6], const double last[6])
     return distance <= 4.0 * size;
 }
 
-/* The guess for the next value (p), from earlier ones; 0 if there is none. */
+/* The guess for the next value (y), from earlier ones; 0 if there is none. */
 static int ablowitz_ladik3_predict(const ablowitz_ladik3_memory *memory, double value[6])
 {
     const int last = memory->count - 1;
@@ -336,7 +336,7 @@ static int ablowitz_ladik3_advance(ablowitz_ladik3_solver *s, const double chang
 }
 
 /* Coefficient k of the product of two Taylor series. */
-static double ablowitz_ladik3_product(const double *a, const double *b, int k)
+static double ablowitz_ladik3_taylor_product(const double *a, const double *b, int k)
 {
     double sum = 0.0;
     for (int j = 0; j <= k; ++j) sum += a[j] * b[k - j];
@@ -419,23 +419,23 @@ static int ablowitz_ladik3_piece(const double *coef, const double p[6], const do
     s[26][0] = p[4] * s[25][0];
     for (int k = 0; k < 30; ++k) {
         if (k > 0) {
-            s[6][k] = ablowitz_ladik3_product(s[0], s[0], k);
+            s[6][k] = ablowitz_ladik3_taylor_product(s[0], s[0], k);
             s[7][k] = -s[6][k];
-            s[8][k] = ablowitz_ladik3_product(s[1], s[1], k);
+            s[8][k] = ablowitz_ladik3_taylor_product(s[1], s[1], k);
             s[9][k] = s[7][k] - s[8][k];
             s[10][k] = p[1] * s[9][k];
             s[11][k] = s[8][k] - s[7][k];
             s[12][k] = p[0] * s[11][k];
-            s[13][k] = ablowitz_ladik3_product(s[2], s[2], k);
+            s[13][k] = ablowitz_ladik3_taylor_product(s[2], s[2], k);
             s[14][k] = -s[13][k];
-            s[15][k] = ablowitz_ladik3_product(s[3], s[3], k);
+            s[15][k] = ablowitz_ladik3_taylor_product(s[3], s[3], k);
             s[16][k] = s[14][k] - s[15][k];
             s[17][k] = p[3] * s[16][k];
             s[18][k] = s[15][k] - s[14][k];
             s[19][k] = p[2] * s[18][k];
-            s[20][k] = ablowitz_ladik3_product(s[4], s[4], k);
+            s[20][k] = ablowitz_ladik3_taylor_product(s[4], s[4], k);
             s[21][k] = -s[20][k];
-            s[22][k] = ablowitz_ladik3_product(s[5], s[5], k);
+            s[22][k] = ablowitz_ladik3_taylor_product(s[5], s[5], k);
             s[23][k] = s[21][k] - s[22][k];
             s[24][k] = p[5] * s[23][k];
             s[25][k] = s[22][k] - s[21][k];
@@ -487,12 +487,12 @@ static int ablowitz_ladik3_path(const double *coef, const double x[6], const dou
     return 0;
 }
 
-/* The residual p - grad S_h(mean of the path) of the equation for p, with the path's change of x and an
-   approximate Jacobian of the residual. 0 if the path cannot be followed. */
-static int ablowitz_ladik3_residual(ablowitz_ladik3_solver *s, const double *coef, const double p[6], double residual[6],
-    double change[6], double jacobian[36])
+/* The residual p - grad S_h(mean of the path) of the equation for p, with that mean y, the path's change of
+   x and an approximate Jacobian of the residual. 0 if the path cannot be followed. */
+static int ablowitz_ladik3_residual(ablowitz_ladik3_solver *s, const double *coef, const double p[6], double y[6],
+    double residual[6], double change[6], double jacobian[36])
 {
-    double y[6], mean[6];
+    double mean[6];
     if (!ablowitz_ladik3_path(coef, s->x, p, change, mean)) return 0;
     for (int i = 0; i < 6; ++i) y[i] = s->x[i] + mean[i];
     ablowitz_ladik3_generate(coef, y, residual, jacobian);
@@ -505,12 +505,12 @@ static int ablowitz_ladik3_residual(ablowitz_ladik3_solver *s, const double *coe
 static int ablowitz_ladik3_differences(ablowitz_ladik3_solver *s, const double *coef, const double p[6],
     const double residual[6], double jacobian[36])
 {
-    double q[6], moved[6], change[6], unused[36], norm = DBL_MIN;
+    double q[6], y[6], moved[6], change[6], unused[36], norm = DBL_MIN;
     for (int i = 0; i < 6; ++i) norm = fabs(p[i]) > norm ? fabs(p[i]) : norm;
     for (int j = 0; j < 6; ++j) {
         memcpy(q, p, sizeof q);
         q[j] += 1e-7 * norm;
-        if (!ablowitz_ladik3_residual(s, coef, q, moved, change, unused)) return 0;
+        if (!ablowitz_ladik3_residual(s, coef, q, y, moved, change, unused)) return 0;
         for (int i = 0; i < 6; ++i) jacobian[i * 6 + j] = (moved[i] - residual[i]) / (q[j] - p[j]);
     }
     return 1;
@@ -521,10 +521,11 @@ static ablowitz_ladik3_status ablowitz_ladik3_attempt(ablowitz_ladik3_solver *s,
 {
     const double *coef = s->coef[stage], none[6] = { 0.0 };
     ablowitz_ladik3_memory *memory = &s->memory[stage];
-    double p[6], residual[6], change[6], jacobian[36], previous = HUGE_VAL;
-    ablowitz_ladik3_predict(memory, p);
+    double p[6], y[6], residual[6], change[6], jacobian[36], previous = HUGE_VAL;
+    if (!ablowitz_ladik3_predict(memory, y)) memcpy(y, s->x, sizeof y);
+    ablowitz_ladik3_generate(coef, y, p, jacobian);
     for (int iteration = 0; iteration < 20; ++iteration) {
-        if (!ablowitz_ladik3_residual(s, coef, p, residual, change, jacobian)) return ablowitz_ladik3_NO_CONVERGENCE;
+        if (!ablowitz_ladik3_residual(s, coef, p, y, residual, change, jacobian)) return ablowitz_ladik3_NO_CONVERGENCE;
         double size = 0.0, norm = DBL_MIN;
         for (int i = 0; i < 6; ++i) {
             if (!isfinite(residual[i])) return ablowitz_ladik3_NOT_FINITE;
@@ -535,7 +536,7 @@ static ablowitz_ladik3_status ablowitz_ladik3_attempt(ablowitz_ladik3_solver *s,
         /* The second test: residuals no longer shrink, the solve has reached the level of rounding. */
         if (size <= 4e-16 || (previous < 1e-12 && size > 0.25 * previous)) {
             if (!ablowitz_ladik3_advance(s, change, none)) return ablowitz_ladik3_NOT_FINITE;
-            ablowitz_ladik3_remember(memory, p, iteration);
+            ablowitz_ladik3_remember(memory, y, iteration);
             return ablowitz_ladik3_OK;
         }
         if (iteration >= 3 && size > 0.2 * previous && !ablowitz_ladik3_differences(s, coef, p, residual, jacobian))

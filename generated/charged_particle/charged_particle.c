@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 3ac6f7886f465da4c5552989a8db2a858ef4d6a77ec12a70a399653b35a286c2
+ * body-sha256: 727afd51698be63fbcd17e19b3df586d6d746c467078086dd4a4242493873083
  */
 #include "charged_particle.h"
 
@@ -183,7 +183,7 @@ static int charged_particle_near(const double guess[6], const double last[6])
     return distance <= 4.0 * size;
 }
 
-/* The guess for the next value (p), from earlier ones; 0 if there is none. */
+/* The guess for the next value (y), from earlier ones; 0 if there is none. */
 static int charged_particle_predict(const charged_particle_memory *memory, double value[6])
 {
     const int last = memory->count - 1;
@@ -352,7 +352,7 @@ static int charged_particle_advance(charged_particle_solver *s, const double cha
 }
 
 /* Coefficient k of the product of two Taylor series. */
-static double charged_particle_product(const double *a, const double *b, int k)
+static double charged_particle_taylor_product(const double *a, const double *b, int k)
 {
     double sum = 0.0;
     for (int j = 0; j <= k; ++j) sum += a[j] * b[k - j];
@@ -421,8 +421,8 @@ static int charged_particle_piece(const double *coef, const double p[6], const d
     s[18][0] = f0;
     for (int k = 0; k < 30; ++k) {
         if (k > 0) {
-            s[6][k] = charged_particle_product(s[1], s[1], k);
-            s[7][k] = charged_particle_product(s[0], s[0], k);
+            s[6][k] = charged_particle_taylor_product(s[1], s[1], k);
+            s[7][k] = charged_particle_taylor_product(s[0], s[0], k);
             s[8][k] = s[7][k];
             s[9][k] = s[6][k] + s[8][k];
             s[10][k] = p[4] * s[9][k];
@@ -481,12 +481,12 @@ static int charged_particle_path(const double *coef, const double x[6], const do
     return 0;
 }
 
-/* The residual p - grad S_h(mean of the path) of the equation for p, with the path's change of x and an
-   approximate Jacobian of the residual. 0 if the path cannot be followed. */
-static int charged_particle_residual(charged_particle_solver *s, const double *coef, const double p[6], double residual[6],
-    double change[6], double jacobian[36])
+/* The residual p - grad S_h(mean of the path) of the equation for p, with that mean y, the path's change of
+   x and an approximate Jacobian of the residual. 0 if the path cannot be followed. */
+static int charged_particle_residual(charged_particle_solver *s, const double *coef, const double p[6], double y[6],
+    double residual[6], double change[6], double jacobian[36])
 {
-    double y[6], mean[6];
+    double mean[6];
     if (!charged_particle_path(coef, s->x, p, change, mean)) return 0;
     for (int i = 0; i < 6; ++i) y[i] = s->x[i] + mean[i];
     charged_particle_generate(coef, y, residual, jacobian);
@@ -499,12 +499,12 @@ static int charged_particle_residual(charged_particle_solver *s, const double *c
 static int charged_particle_differences(charged_particle_solver *s, const double *coef, const double p[6],
     const double residual[6], double jacobian[36])
 {
-    double q[6], moved[6], change[6], unused[36], norm = DBL_MIN;
+    double q[6], y[6], moved[6], change[6], unused[36], norm = DBL_MIN;
     for (int i = 0; i < 6; ++i) norm = fabs(p[i]) > norm ? fabs(p[i]) : norm;
     for (int j = 0; j < 6; ++j) {
         memcpy(q, p, sizeof q);
         q[j] += 1e-7 * norm;
-        if (!charged_particle_residual(s, coef, q, moved, change, unused)) return 0;
+        if (!charged_particle_residual(s, coef, q, y, moved, change, unused)) return 0;
         for (int i = 0; i < 6; ++i) jacobian[i * 6 + j] = (moved[i] - residual[i]) / (q[j] - p[j]);
     }
     return 1;
@@ -515,10 +515,11 @@ static charged_particle_status charged_particle_attempt(charged_particle_solver 
 {
     const double *coef = s->coef[stage], none[6] = { 0.0 };
     charged_particle_memory *memory = &s->memory[stage];
-    double p[6], residual[6], change[6], jacobian[36], previous = HUGE_VAL;
-    charged_particle_predict(memory, p);
+    double p[6], y[6], residual[6], change[6], jacobian[36], previous = HUGE_VAL;
+    if (!charged_particle_predict(memory, y)) memcpy(y, s->x, sizeof y);
+    charged_particle_generate(coef, y, p, jacobian);
     for (int iteration = 0; iteration < 20; ++iteration) {
-        if (!charged_particle_residual(s, coef, p, residual, change, jacobian)) return charged_particle_NO_CONVERGENCE;
+        if (!charged_particle_residual(s, coef, p, y, residual, change, jacobian)) return charged_particle_NO_CONVERGENCE;
         double size = 0.0, norm = DBL_MIN;
         for (int i = 0; i < 6; ++i) {
             if (!isfinite(residual[i])) return charged_particle_NOT_FINITE;
@@ -529,7 +530,7 @@ static charged_particle_status charged_particle_attempt(charged_particle_solver 
         /* The second test: residuals no longer shrink, the solve has reached the level of rounding. */
         if (size <= 4e-16 || (previous < 1e-12 && size > 0.25 * previous)) {
             if (!charged_particle_advance(s, change, none)) return charged_particle_NOT_FINITE;
-            charged_particle_remember(memory, p, iteration);
+            charged_particle_remember(memory, y, iteration);
             return charged_particle_OK;
         }
         if (iteration >= 3 && size > 0.2 * previous && !charged_particle_differences(s, coef, p, residual, jacobian))

@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 1de94da270af4aa2ca59db7f967698785340f876dcb41d03a2da3fa2f4d63fcf
+ * body-sha256: c404c717c19ba06cc4806a1d4a0e05e32d57c13058abac8461657f441ab7c955
  */
 #ifndef GUIDING_CENTRE_H
 #define GUIDING_CENTRE_H
@@ -49,7 +49,7 @@ typedef enum {
 } guiding_centre_status;
 
 /* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
-   fitted to the last 96 values. They affect speed only. */
+   fitted to the last 95 values. They affect speed only. */
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
@@ -58,8 +58,8 @@ typedef struct {
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */
     int patience; /* how many of those before the recurrence is fitted again */
-    double past[192][guiding_centre_DIM]; /* values, the latest last */
-    double weight[32][guiding_centre_DIM][1]; /* of past values, the latest first, for the next value */
+    double past[190][guiding_centre_DIM]; /* values, the latest last */
+    double weight[32][guiding_centre_DIM][8]; /* of past values, the latest first, for the next values */
 } guiding_centre_memory;
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with guiding_centre_init. */
@@ -71,6 +71,13 @@ typedef struct {
     guiding_centre_params params;
     double h;  /* the step size that coef belongs to */
     int ready; /* whether coef has been computed */
+    double effort;  /* evaluations that a single step takes, for each stage */
+    int pause;      /* steps to make singly before a block is tried */
+    int setback;    /* the last pause, halved with every block that succeeds */
+    int foreseeing; /* whether blocks are guessed by recurrences */
+    int passes;     /* that the last block took which was guessed by Runge-Kutta steps */
+    size_t doubt;   /* steps to wait before recurrences are tried again */
+    size_t retry;   /* steps after which that is */
     double coef[5][5]; /* what depends on params and h only, for each stage */
     guiding_centre_memory memory[5];
 } guiding_centre_solver;

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: c37ce094add6e678bef8cd9eb0be4e1f427bd18bb4fbccda714455654e4ce4ee
+ * body-sha256: 628a47acccb50be1c8595539cc0b3e708fb81aad25c48cc58e1af51ad9238b3d
  */
 #include "sir_epidemic.h"
 
@@ -139,7 +139,7 @@ static int sir_epidemic_near(const double guess[3], const double last[3])
     return distance <= 4.0 * size;
 }
 
-/* The guess for the next value (p), from earlier ones; 0 if there is none. */
+/* The guess for the next value (y), from earlier ones; 0 if there is none. */
 static int sir_epidemic_predict(const sir_epidemic_memory *memory, double value[3])
 {
     const int last = memory->count - 1;
@@ -209,20 +209,20 @@ static void sir_epidemic_project(int rows, double (*one)[8], int column, double 
     }
 }
 
-/* Fit the recurrences value[m + l] = sum of weight[k][..][l] * value[m - 1 - k], l = 0 ... 1 - 1, to the history of
+/* Fit the recurrences value[m + l] = sum of weight[k][..][l] * value[m - 1 - k], l = 0 ... 8 - 1, to the history of
    a component: ridge least squares by modified Gram-Schmidt, the ridge at the level of rounding. Columns are taken in by
    eights, until they leave next to nothing of the right-hand sides. How many past values are used. */
 static int sir_epidemic_train(sir_epidemic_memory *memory, int component)
 {
-    enum { AHEAD = 1, WINDOW = 32, ROWS = 64 };
+    enum { AHEAD = 8, WINDOW = 32, ROWS = 56 };
     double q[WINDOW / 8][ROWS + WINDOW][8], r[WINDOW / 8][WINDOW][8], inverse[WINDOW]; /* eight columns in each part */
-    double right[ROWS + WINDOW][8], weight[WINDOW][8], value[96], largest = 0.0, left = HUGE_VAL;
+    double right[ROWS + WINDOW][8], weight[WINDOW][8], value[95], largest = 0.0, left = HUGE_VAL;
     int terms = 0;
     memset(q, 0, sizeof q);
     memset(right, 0, sizeof right);
     memset(weight, 0, sizeof weight);
-    for (int i = 0; i < 96; ++i) {
-        value[i] = memory->past[memory->count - 96 + i][component];
+    for (int i = 0; i < 95; ++i) {
+        value[i] = memory->past[memory->count - 95 + i][component];
         if (fabs(value[i]) > largest) largest = fabs(value[i]);
     }
     for (int i = 0; i < ROWS; ++i)
@@ -253,9 +253,9 @@ static int sir_epidemic_train(sir_epidemic_memory *memory, int component)
 /* Drop what is old, if so many values would not fit into the history. */
 static void sir_epidemic_make_room(sir_epidemic_memory *memory, int values)
 {
-    if (memory->count + values <= 192) return;
-    memmove(memory->past, memory->past + memory->count - 96, 96 * sizeof memory->past[0]);
-    memory->count = 96;
+    if (memory->count + values <= 190) return;
+    memmove(memory->past, memory->past + memory->count - 95, 95 * sizeof memory->past[0]);
+    memory->count = 95;
 }
 
 /* Add a value to the history. */
@@ -285,7 +285,7 @@ static void sir_epidemic_remember(sir_epidemic_memory *memory, const double valu
     if (iterations > 1) sir_epidemic_judge(memory, value);
     sir_epidemic_record(memory, value);
     memory->slow = iterations > 1 ? memory->slow + 1 : 0;
-    if (memory->slow > memory->patience && memory->count >= 96) sir_epidemic_fit(memory);
+    if (memory->slow > memory->patience && memory->count >= 95) sir_epidemic_fit(memory);
 }
 
 /* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last
@@ -308,7 +308,7 @@ static int sir_epidemic_advance(sir_epidemic_solver *s, const double change[3], 
 }
 
 /* Coefficient k of the product of two Taylor series. */
-static double sir_epidemic_product(const double *a, const double *b, int k)
+static double sir_epidemic_taylor_product(const double *a, const double *b, int k)
 {
     double sum = 0.0;
     for (int j = 0; j <= k; ++j) sum += a[j] * b[k - j];
@@ -360,7 +360,7 @@ static int sir_epidemic_piece(const double *coef, const double p[3], const doubl
     s[9][0] = s[7][0] - s[4][0];
     for (int k = 0; k < 30; ++k) {
         if (k > 0) {
-            s[3][k] = sir_epidemic_product(s[1], s[0], k);
+            s[3][k] = sir_epidemic_taylor_product(s[1], s[0], k);
             s[4][k] = p[1] * s[3][k];
             s[5][k] = p[2] * s[3][k];
             s[6][k] = s[4][k] - s[5][k];
@@ -411,12 +411,12 @@ static int sir_epidemic_path(const double *coef, const double x[3], const double
     return 0;
 }
 
-/* The residual p - grad S_h(mean of the path) of the equation for p, with the path's change of x and an
-   approximate Jacobian of the residual. 0 if the path cannot be followed. */
-static int sir_epidemic_residual(sir_epidemic_solver *s, const double *coef, const double p[3], double residual[3],
-    double change[3], double jacobian[9])
+/* The residual p - grad S_h(mean of the path) of the equation for p, with that mean y, the path's change of
+   x and an approximate Jacobian of the residual. 0 if the path cannot be followed. */
+static int sir_epidemic_residual(sir_epidemic_solver *s, const double *coef, const double p[3], double y[3],
+    double residual[3], double change[3], double jacobian[9])
 {
-    double y[3], mean[3];
+    double mean[3];
     if (!sir_epidemic_path(coef, s->x, p, change, mean)) return 0;
     for (int i = 0; i < 3; ++i) y[i] = s->x[i] + mean[i];
     sir_epidemic_generate(coef, y, residual, jacobian);
@@ -429,12 +429,12 @@ static int sir_epidemic_residual(sir_epidemic_solver *s, const double *coef, con
 static int sir_epidemic_differences(sir_epidemic_solver *s, const double *coef, const double p[3],
     const double residual[3], double jacobian[9])
 {
-    double q[3], moved[3], change[3], unused[9], norm = DBL_MIN;
+    double q[3], y[3], moved[3], change[3], unused[9], norm = DBL_MIN;
     for (int i = 0; i < 3; ++i) norm = fabs(p[i]) > norm ? fabs(p[i]) : norm;
     for (int j = 0; j < 3; ++j) {
         memcpy(q, p, sizeof q);
         q[j] += 1e-7 * norm;
-        if (!sir_epidemic_residual(s, coef, q, moved, change, unused)) return 0;
+        if (!sir_epidemic_residual(s, coef, q, y, moved, change, unused)) return 0;
         for (int i = 0; i < 3; ++i) jacobian[i * 3 + j] = (moved[i] - residual[i]) / (q[j] - p[j]);
     }
     return 1;
@@ -445,10 +445,11 @@ static sir_epidemic_status sir_epidemic_attempt(sir_epidemic_solver *s, int stag
 {
     const double *coef = s->coef[stage], none[3] = { 0.0 };
     sir_epidemic_memory *memory = &s->memory[stage];
-    double p[3], residual[3], change[3], jacobian[9], previous = HUGE_VAL;
-    sir_epidemic_predict(memory, p);
+    double p[3], y[3], residual[3], change[3], jacobian[9], previous = HUGE_VAL;
+    if (!sir_epidemic_predict(memory, y)) memcpy(y, s->x, sizeof y);
+    sir_epidemic_generate(coef, y, p, jacobian);
     for (int iteration = 0; iteration < 20; ++iteration) {
-        if (!sir_epidemic_residual(s, coef, p, residual, change, jacobian)) return sir_epidemic_NO_CONVERGENCE;
+        if (!sir_epidemic_residual(s, coef, p, y, residual, change, jacobian)) return sir_epidemic_NO_CONVERGENCE;
         double size = 0.0, norm = DBL_MIN;
         for (int i = 0; i < 3; ++i) {
             if (!isfinite(residual[i])) return sir_epidemic_NOT_FINITE;
@@ -459,7 +460,7 @@ static sir_epidemic_status sir_epidemic_attempt(sir_epidemic_solver *s, int stag
         /* The second test: residuals no longer shrink, the solve has reached the level of rounding. */
         if (size <= 4e-16 || (previous < 1e-12 && size > 0.25 * previous)) {
             if (!sir_epidemic_advance(s, change, none)) return sir_epidemic_NOT_FINITE;
-            sir_epidemic_remember(memory, p, iteration);
+            sir_epidemic_remember(memory, y, iteration);
             return sir_epidemic_OK;
         }
         if (iteration >= 3 && size > 0.2 * previous && !sir_epidemic_differences(s, coef, p, residual, jacobian))
@@ -514,6 +515,11 @@ static sir_epidemic_status sir_epidemic_set_step(sir_epidemic_solver *s, double 
         sir_epidemic_prepare(&s->params, sir_epidemic_fractions[stage] * h, s->coef[stage]);
     memset(s->memory, 0, sizeof s->memory);
     for (int stage = 0; stage < 1; ++stage) s->memory[stage].patience = 150;
+    s->pause = 16;
+    s->setback = s->foreseeing = 0;
+    s->doubt = s->retry = 0;
+    s->effort = 0.0;
+    s->passes = INT_MAX;
     s->h = h;
     s->ready = 1;
     return sir_epidemic_OK;
@@ -528,34 +534,1330 @@ sir_epidemic_status sir_epidemic_step(sir_epidemic_solver *s, double h)
     return status;
 }
 
+/*
+ * Eight at a time: below, the formulas of a step are evaluated for 8 steps of a trajectory, or members of an
+ * ensemble, at once. Compilers make vector instructions of the loops over lanes.
+ */
+enum { sir_epidemic_LANES = 8 };
+
+#if defined(__GNUC__)
+typedef double sir_epidemic_lanes[sir_epidemic_LANES] __attribute__((aligned(64))); /* a value in each lane */
+#else
+typedef double sir_epidemic_lanes[sir_epidemic_LANES];
+#endif
+
+#if defined(__clang__)
+#define sir_epidemic_EACH_LANE _Pragma("clang loop vectorize(assume_safety)")
+#pragma clang diagnostic push
+#pragma clang diagnostic ignored "-Wpass-failed"
+#elif defined(__GNUC__)
+#define sir_epidemic_EACH_LANE _Pragma("GCC ivdep") _Pragma("GCC unroll 1")
+#else
+#define sir_epidemic_EACH_LANE
+#endif
+
+/* What all blocks share: coefficients, the same in each lane, and the recurrences by which they are foreseen. */
+typedef struct {
+    int fits[1]; /* the fit that weight is of; -1 for none */
+    sir_epidemic_lanes coef[1][4], weight[1][32][3];
+} sir_epidemic_table;
+
+/* A stage in all lanes, linearised around y: a residual r of alpha(y) = x takes inverse r from y and gain r from the
+   increment. */
+typedef struct {
+    sir_epidemic_lanes y[3], displacement[3], increment[3], residual[3];
+    sir_epidemic_lanes inverse[9], slope[9], gain[9];
+    sir_epidemic_lanes at[3], middle[3]; /* y when it was last evaluated, the middle of the path less y */
+    sir_epidemic_lanes sway[9]; /* the derivative of middle along y */
+    sir_epidemic_lanes alpha_y[9], increment_y[9]; /* of alpha and beta - alpha, with p held fixed */
+} sir_epidemic_model;
+
+/* sir_epidemic_curvature in all lanes. */
+static void sir_epidemic_curvature_lanes(sir_epidemic_lanes coef[restrict 4], sir_epidemic_lanes y[restrict 3],
+                                         sir_epidemic_lanes slope[restrict 3],
+                                         sir_epidemic_lanes slope_jacobian[restrict 9])
+{
+    sir_epidemic_EACH_LANE
+    for (int lane = 0; lane < sir_epidemic_LANES; ++lane) {
+        const double S = y[0][lane];
+        const double I_ = y[1][lane];
+        const double t1 = 1.0 / S;
+        slope[0][lane] = coef[1][lane] + coef[0][lane] * t1;
+        slope[1][lane] = coef[1][lane] + I_ * coef[2][lane];
+        slope[2][lane] = 0.0;
+        slope_jacobian[0][lane] = coef[3][lane] * (t1 * t1);
+        slope_jacobian[1][lane] = 0.0;
+        slope_jacobian[2][lane] = 0.0;
+        slope_jacobian[3][lane] = 0.0;
+        slope_jacobian[4][lane] = coef[2][lane];
+        slope_jacobian[5][lane] = 0.0;
+        slope_jacobian[6][lane] = 0.0;
+        slope_jacobian[7][lane] = 0.0;
+        slope_jacobian[8][lane] = 0.0;
+    }
+}
+
+/* sir_epidemic_momentum in all lanes. */
+static void sir_epidemic_momentum_lanes(sir_epidemic_lanes coef[restrict 4], sir_epidemic_lanes y[restrict 3],
+                                        sir_epidemic_lanes slope[restrict 3])
+{
+    sir_epidemic_EACH_LANE
+    for (int lane = 0; lane < sir_epidemic_LANES; ++lane) {
+        const double S = y[0][lane];
+        const double I_ = y[1][lane];
+        slope[0][lane] = coef[1][lane] + coef[0][lane] / S;
+        slope[1][lane] = coef[1][lane] + I_ * coef[2][lane];
+        slope[2][lane] = 0.0;
+    }
+}
+
+/* sir_epidemic_values in all lanes. */
+static void sir_epidemic_values_lanes(sir_epidemic_lanes coef[restrict 4], sir_epidemic_lanes p[restrict 3],
+                                      sir_epidemic_lanes m[restrict 3], sir_epidemic_lanes value[restrict 10],
+                                      sir_epidemic_lanes fixed[restrict 1])
+{
+    (void)coef;
+    (void)fixed;
+    sir_epidemic_EACH_LANE
+    for (int lane = 0; lane < sir_epidemic_LANES; ++lane) {
+        const double S = m[0][lane];
+        const double I_ = m[1][lane];
+        const double R = m[2][lane];
+        const double t1 = I_ * S;
+        const double t2 = p[1][lane] * t1;
+        const double t3 = p[2][lane] * t1;
+        const double t4 = p[0][lane] * t1;
+        value[0][lane] = S;
+        value[1][lane] = I_;
+        value[2][lane] = R;
+        value[3][lane] = t1;
+        value[4][lane] = t2;
+        value[5][lane] = t3;
+        value[6][lane] = t2 - t3;
+        value[7][lane] = t4;
+        value[8][lane] = t3 - t4;
+        value[9][lane] = t4 - t2;
+    }
+}
+
+/* sir_epidemic_slope_values in all lanes. */
+static void sir_epidemic_slope_values_lanes(sir_epidemic_lanes coef[restrict 4],
+                                            sir_epidemic_lanes p[restrict 3],
+                                            sir_epidemic_lanes value[restrict 10],
+                                            sir_epidemic_lanes fixed[restrict 1],
+                                            sir_epidemic_lanes slope[restrict 13],
+                                            sir_epidemic_lanes slope_fixed[restrict 1])
+{
+    (void)coef;
+    (void)fixed;
+    (void)slope_fixed;
+    sir_epidemic_EACH_LANE
+    for (int lane = 0; lane < sir_epidemic_LANES; ++lane) {
+        const double t1 = p[1][lane] * value[1][lane];
+        const double t2 = p[2][lane] * value[1][lane];
+        const double t3 = p[1][lane] * value[0][lane];
+        const double t4 = p[2][lane] * value[0][lane];
+        const double t5 = p[0][lane] * value[1][lane];
+        const double t6 = p[0][lane] * value[0][lane];
+        slope[0][lane] = t1;
+        slope[1][lane] = t2;
+        slope[2][lane] = t1 - t2;
+        slope[3][lane] = t3;
+        slope[4][lane] = t4;
+        slope[5][lane] = t3 - t4;
+        slope[6][lane] = t5;
+        slope[7][lane] = t2 - t5;
+        slope[8][lane] = t6;
+        slope[9][lane] = t4 - t6;
+        slope[10][lane] = t5 - t1;
+        slope[11][lane] = t6 - t3;
+        slope[12][lane] = -value[3][lane];
+    }
+}
+
+/* sir_epidemic_along_mean in all lanes. */
+static void sir_epidemic_along_mean_lanes(sir_epidemic_lanes even[restrict 18],
+                                          sir_epidemic_lanes odd[restrict 18],
+                                          sir_epidemic_lanes mean[restrict 18],
+                                          sir_epidemic_lanes hessian[restrict 9],
+                                          sir_epidemic_lanes alpha_y[restrict 9],
+                                          sir_epidemic_lanes increment_y[restrict 9],
+                                          sir_epidemic_lanes jacobian[restrict 9],
+                                          sir_epidemic_lanes increment_jacobian[restrict 9],
+                                          sir_epidemic_lanes sway[restrict 9],
+                                          sir_epidemic_lanes reciprocal[restrict 3])
+{
+    sir_epidemic_EACH_LANE
+    for (int lane = 0; lane < sir_epidemic_LANES; ++lane) {
+        const double t1 = even[2][lane] - odd[2][lane];
+        const double t2 = 1.0 / mean[0][lane];
+        const double t3 = mean[1][lane] * t2;
+        const double t4 = mean[13][lane] - mean[12][lane] * t3;
+        const double t5 = 1.0 / (mean[7][lane] - mean[6][lane] * t3);
+        const double t6 = mean[6][lane] * t2 * t5;
+        const double t7 = mean[2][lane] * t2;
+        const double t8 = (mean[8][lane] - mean[6][lane] * t7) * t5;
+        const double t9 = 1.0 / (mean[14][lane] - mean[12][lane] * t7 - t4 * t8);
+        const double t10 = (t4 * t6 - mean[12][lane] * t2) * t9;
+        const double t11 = even[0][lane] - odd[0][lane];
+        const double t12 = t7 - t3 * t8;
+        const double t13 = t2 + t3 * t6 - t12 * t10;
+        const double t14 = even[1][lane] - odd[1][lane];
+        const double t15 = t6 + t8 * t10;
+        const double t16 = t4 * t5 * t9;
+        const double t17 = t5 + t8 * t16;
+        const double t18 = t12 * t16 - t3 * t5;
+        const double t19 = t12 * t9;
+        const double t20 = t8 * t9;
+        const double t21 = even[8][lane] - odd[8][lane];
+        const double t22 = even[6][lane] - odd[6][lane];
+        const double t23 = even[7][lane] - odd[7][lane];
+        const double t24 = even[14][lane] - odd[14][lane];
+        const double t25 = even[12][lane] - odd[12][lane];
+        const double t26 = even[13][lane] - odd[13][lane];
+        const double t27 = even[5][lane] - odd[5][lane];
+        const double t28 = even[4][lane] - odd[4][lane];
+        const double t29 = even[3][lane] - odd[3][lane];
+        const double t30 = hessian[6][lane] * mean[11][lane] + (hessian[0][lane] * mean[9][lane] + hessian[3][lane] * mean[10][lane]);
+        const double t31 = 1.0 - (hessian[6][lane] * mean[5][lane] + (hessian[3][lane] * mean[4][lane] + hessian[0][lane] * mean[3][lane]));
+        const double t32 = hessian[6][lane] * mean[17][lane] + (hessian[3][lane] * mean[16][lane] + hessian[0][lane] * mean[15][lane]);
+        const double t33 = t30 * t16 + t31 * t10 - t32 * t9;
+        const double t34 = t32 * t20 - (t31 * t15 + t30 * t17);
+        const double t35 = t32 * t19 + (t31 * t13 - t30 * t18);
+        const double t36 = hessian[7][lane] * mean[17][lane] + (hessian[1][lane] * mean[15][lane] + hessian[4][lane] * mean[16][lane]);
+        const double t37 = 1.0 - (hessian[7][lane] * mean[11][lane] + (hessian[4][lane] * mean[10][lane] + hessian[1][lane] * mean[9][lane]));
+        const double t38 = hessian[7][lane] * mean[5][lane] + (hessian[4][lane] * mean[4][lane] + hessian[1][lane] * mean[3][lane]);
+        const double t39 = t36 * t19 + (t37 * t18 - t38 * t13);
+        const double t40 = t36 * t20 + (t37 * t17 + t38 * t15);
+        const double t41 = t36 * t9 + (t37 * t16 + t38 * t10);
+        const double t42 = 1.0 - (hessian[8][lane] * mean[17][lane] + (hessian[2][lane] * mean[15][lane] + hessian[5][lane] * mean[16][lane]));
+        const double t43 = hessian[8][lane] * mean[11][lane] + (hessian[5][lane] * mean[10][lane] + hessian[2][lane] * mean[9][lane]);
+        const double t44 = hessian[8][lane] * mean[5][lane] + (hessian[5][lane] * mean[4][lane] + hessian[2][lane] * mean[3][lane]);
+        const double t45 = t42 * t9 + (t43 * t16 - t44 * t10);
+        const double t46 = t44 * t15 - t43 * t17 - t42 * t20;
+        const double t47 = t42 * t19 + (t43 * t18 + t44 * t13);
+        const double t48 = even[11][lane] - odd[11][lane];
+        const double t49 = even[9][lane] - odd[9][lane];
+        const double t50 = even[10][lane] - odd[10][lane];
+        const double t51 = even[17][lane] - odd[17][lane];
+        const double t52 = even[16][lane] - odd[16][lane];
+        const double t53 = even[15][lane] - odd[15][lane];
+        const double t54 = 2.0 * (hessian[6][lane] * odd[5][lane]) + (2.0 * (hessian[3][lane] * odd[4][lane]) + 2.0 * (hessian[0][lane] * odd[3][lane])) + (2.0 * (odd[2][lane] * t33) + (2.0 * (odd[1][lane] * t34) + 2.0 * (odd[0][lane] * t35)));
+        const double t55 = 2.0 * (hessian[7][lane] * odd[5][lane]) + (2.0 * (hessian[1][lane] * odd[3][lane]) + 2.0 * (hessian[4][lane] * odd[4][lane])) + (2.0 * (odd[0][lane] * t39) + 2.0 * (odd[1][lane] * t40) - 2.0 * (odd[2][lane] * t41));
+        const double t56 = 2.0 * (hessian[8][lane] * odd[5][lane]) + (2.0 * (hessian[2][lane] * odd[3][lane]) + 2.0 * (hessian[5][lane] * odd[4][lane])) + (2.0 * (odd[2][lane] * t45) + (2.0 * (odd[1][lane] * t46) - 2.0 * (odd[0][lane] * t47)));
+        const double t57 = 2.0 * (hessian[6][lane] * odd[11][lane]) + (2.0 * (hessian[0][lane] * odd[9][lane]) + 2.0 * (hessian[3][lane] * odd[10][lane])) + (2.0 * (odd[8][lane] * t33) + (2.0 * (odd[6][lane] * t35) + 2.0 * (odd[7][lane] * t34)));
+        const double t58 = 2.0 * (hessian[7][lane] * odd[11][lane]) + (2.0 * (hessian[4][lane] * odd[10][lane]) + 2.0 * (hessian[1][lane] * odd[9][lane])) + (2.0 * (odd[6][lane] * t39) + 2.0 * (odd[7][lane] * t40) - 2.0 * (odd[8][lane] * t41));
+        const double t59 = 2.0 * (hessian[8][lane] * odd[11][lane]) + (2.0 * (hessian[2][lane] * odd[9][lane]) + 2.0 * (hessian[5][lane] * odd[10][lane])) + (2.0 * (odd[8][lane] * t45) + (2.0 * (odd[7][lane] * t46) - 2.0 * (odd[6][lane] * t47)));
+        const double t60 = 2.0 * (hessian[6][lane] * odd[17][lane]) + (2.0 * (hessian[0][lane] * odd[15][lane]) + 2.0 * (hessian[3][lane] * odd[16][lane])) + (2.0 * (odd[14][lane] * t33) + (2.0 * (odd[13][lane] * t34) + 2.0 * (odd[12][lane] * t35)));
+        const double t61 = 2.0 * (hessian[7][lane] * odd[17][lane]) + (2.0 * (hessian[4][lane] * odd[16][lane]) + 2.0 * (hessian[1][lane] * odd[15][lane])) + (2.0 * (odd[12][lane] * t39) + 2.0 * (odd[13][lane] * t40) - 2.0 * (odd[14][lane] * t41));
+        const double t62 = 2.0 * (hessian[8][lane] * odd[17][lane]) + (2.0 * (hessian[2][lane] * odd[15][lane]) + 2.0 * (hessian[5][lane] * odd[16][lane])) + (2.0 * (odd[14][lane] * t45) + (2.0 * (odd[13][lane] * t46) - 2.0 * (odd[12][lane] * t47)));
+        alpha_y[0][lane] = t1 * t10 + (t11 * t13 - t14 * t15);
+        alpha_y[1][lane] = t14 * t17 + t11 * t18 - t1 * t16;
+        alpha_y[2][lane] = t1 * t9 - (t11 * t19 + t14 * t20);
+        alpha_y[3][lane] = t21 * t10 + (t22 * t13 - t23 * t15);
+        alpha_y[4][lane] = t23 * t17 + t22 * t18 - t21 * t16;
+        alpha_y[5][lane] = t21 * t9 - (t22 * t19 + t23 * t20);
+        alpha_y[6][lane] = t24 * t10 + (t25 * t13 - t26 * t15);
+        alpha_y[7][lane] = t26 * t17 + t25 * t18 - t24 * t16;
+        alpha_y[8][lane] = t24 * t9 - (t25 * t19 + t26 * t20);
+        increment_y[0][lane] = 2.0 * (odd[2][lane] * t10) + (2.0 * (odd[0][lane] * t13) - 2.0 * (odd[1][lane] * t15));
+        increment_y[1][lane] = 2.0 * (odd[0][lane] * t18) + 2.0 * (odd[1][lane] * t17) - 2.0 * (odd[2][lane] * t16);
+        increment_y[2][lane] = 2.0 * (odd[2][lane] * t9) + ((-2.0) * (odd[0][lane] * t19) - 2.0 * (odd[1][lane] * t20));
+        increment_y[3][lane] = 2.0 * (odd[8][lane] * t10) + (2.0 * (odd[6][lane] * t13) - 2.0 * (odd[7][lane] * t15));
+        increment_y[4][lane] = 2.0 * (odd[6][lane] * t18) + 2.0 * (odd[7][lane] * t17) - 2.0 * (odd[8][lane] * t16);
+        increment_y[5][lane] = 2.0 * (odd[8][lane] * t9) + ((-2.0) * (odd[6][lane] * t19) - 2.0 * (odd[7][lane] * t20));
+        increment_y[6][lane] = 2.0 * (odd[14][lane] * t10) + (2.0 * (odd[12][lane] * t13) - 2.0 * (odd[13][lane] * t15));
+        increment_y[7][lane] = 2.0 * (odd[12][lane] * t18) + 2.0 * (odd[13][lane] * t17) - 2.0 * (odd[14][lane] * t16);
+        increment_y[8][lane] = 2.0 * (odd[14][lane] * t9) + ((-2.0) * (odd[12][lane] * t19) - 2.0 * (odd[13][lane] * t20));
+        jacobian[0][lane] = hessian[6][lane] * t27 + (hessian[3][lane] * t28 + hessian[0][lane] * t29) + (t1 * t33 + (t14 * t34 + t11 * t35));
+        jacobian[1][lane] = hessian[7][lane] * t27 + (hessian[1][lane] * t29 + hessian[4][lane] * t28) + (t11 * t39 + t14 * t40 - t1 * t41);
+        jacobian[2][lane] = hessian[8][lane] * t27 + (hessian[5][lane] * t28 + hessian[2][lane] * t29) + (t1 * t45 + (t14 * t46 - t11 * t47));
+        jacobian[3][lane] = hessian[6][lane] * t48 + (hessian[0][lane] * t49 + hessian[3][lane] * t50) + (t21 * t33 + (t22 * t35 + t23 * t34));
+        jacobian[4][lane] = hessian[7][lane] * t48 + (hessian[4][lane] * t50 + hessian[1][lane] * t49) + (t23 * t40 + t22 * t39 - t21 * t41);
+        jacobian[5][lane] = hessian[8][lane] * t48 + (hessian[5][lane] * t50 + hessian[2][lane] * t49) + (t21 * t45 + (t23 * t46 - t22 * t47));
+        jacobian[6][lane] = hessian[6][lane] * t51 + (hessian[3][lane] * t52 + hessian[0][lane] * t53) + (t24 * t33 + (t25 * t35 + t26 * t34));
+        jacobian[7][lane] = hessian[7][lane] * t51 + (hessian[1][lane] * t53 + hessian[4][lane] * t52) + (t25 * t39 + t26 * t40 - t24 * t41);
+        jacobian[8][lane] = hessian[8][lane] * t51 + (hessian[2][lane] * t53 + hessian[5][lane] * t52) + (t24 * t45 + (t26 * t46 - t25 * t47));
+        increment_jacobian[0][lane] = t54;
+        increment_jacobian[1][lane] = t55;
+        increment_jacobian[2][lane] = t56;
+        increment_jacobian[3][lane] = t57;
+        increment_jacobian[4][lane] = t58;
+        increment_jacobian[5][lane] = t59;
+        increment_jacobian[6][lane] = t60;
+        increment_jacobian[7][lane] = t61;
+        increment_jacobian[8][lane] = t62;
+        sway[0][lane] = t35 - 1.0;
+        sway[1][lane] = t39;
+        sway[2][lane] = -t47;
+        sway[3][lane] = t34;
+        sway[4][lane] = t40 - 1.0;
+        sway[5][lane] = t46;
+        sway[6][lane] = t33;
+        sway[7][lane] = -t41;
+        sway[8][lane] = t45 - 1.0;
+        reciprocal[0][lane] = t2;
+        reciprocal[1][lane] = t5;
+        reciprocal[2][lane] = t9;
+    }
+}
+
+/* sir_epidemic_invert in all lanes. */
+static void sir_epidemic_invert_lanes(sir_epidemic_lanes matrix[restrict 9],
+                                      sir_epidemic_lanes slope[restrict 9],
+                                      sir_epidemic_lanes inverse[restrict 9],
+                                      sir_epidemic_lanes gain[restrict 9],
+                                      sir_epidemic_lanes reciprocal[restrict 3])
+{
+    sir_epidemic_EACH_LANE
+    for (int lane = 0; lane < sir_epidemic_LANES; ++lane) {
+        const double t1 = 1.0 / matrix[0][lane];
+        const double t2 = matrix[1][lane] * t1;
+        const double t3 = 1.0 / (matrix[4][lane] - matrix[3][lane] * t2);
+        const double t4 = matrix[3][lane] * t1 * t3;
+        const double t5 = matrix[2][lane] * t1;
+        const double t6 = (matrix[5][lane] - matrix[3][lane] * t5) * t3;
+        const double t7 = t5 - t2 * t6;
+        const double t8 = matrix[7][lane] - matrix[6][lane] * t2;
+        const double t9 = 1.0 / (matrix[8][lane] - matrix[6][lane] * t5 - t8 * t6);
+        const double t10 = (t8 * t4 - matrix[6][lane] * t1) * t9;
+        const double t11 = t1 + t2 * t4 - t7 * t10;
+        const double t12 = t8 * t3 * t9;
+        const double t13 = t7 * t12 - t2 * t3;
+        const double t14 = t7 * t9;
+        const double t15 = t4 + t6 * t10;
+        const double t16 = t3 + t6 * t12;
+        const double t17 = t6 * t9;
+        inverse[0][lane] = t11;
+        inverse[1][lane] = t13;
+        inverse[2][lane] = -t14;
+        inverse[3][lane] = -t15;
+        inverse[4][lane] = t16;
+        inverse[5][lane] = -t17;
+        inverse[6][lane] = t10;
+        inverse[7][lane] = -t12;
+        inverse[8][lane] = t9;
+        gain[0][lane] = slope[2][lane] * t10 + (slope[0][lane] * t11 - slope[1][lane] * t15);
+        gain[1][lane] = slope[0][lane] * t13 + slope[1][lane] * t16 - slope[2][lane] * t12;
+        gain[2][lane] = slope[2][lane] * t9 - (slope[0][lane] * t14 + slope[1][lane] * t17);
+        gain[3][lane] = slope[5][lane] * t10 + (slope[3][lane] * t11 - slope[4][lane] * t15);
+        gain[4][lane] = slope[3][lane] * t13 + slope[4][lane] * t16 - slope[5][lane] * t12;
+        gain[5][lane] = slope[5][lane] * t9 - (slope[4][lane] * t17 + slope[3][lane] * t14);
+        gain[6][lane] = slope[8][lane] * t10 + (slope[6][lane] * t11 - slope[7][lane] * t15);
+        gain[7][lane] = slope[6][lane] * t13 + slope[7][lane] * t16 - slope[8][lane] * t12;
+        gain[8][lane] = slope[8][lane] * t9 - (slope[6][lane] * t14 + slope[7][lane] * t17);
+        reciprocal[0][lane] = t1;
+        reciprocal[1][lane] = t3;
+        reciprocal[2][lane] = t9;
+    }
+}
+
+/* sir_epidemic_size in all lanes, summed over the components. */
+static void sir_epidemic_sizes(sir_epidemic_lanes y[restrict 3], sir_epidemic_lanes delta[restrict 3],
+    sir_epidemic_lanes size)
+{
+    sir_epidemic_lanes norm = { 0.0 };
+    memset(size, 0, sir_epidemic_LANES * sizeof size[0]);
+    for (int i = 0; i < 3; ++i)
+        for (int lane = 0; lane < sir_epidemic_LANES; ++lane)
+            norm[lane] = 1e-6 * fabs(y[i][lane]) > norm[lane] ? 1e-6 * fabs(y[i][lane]) : norm[lane];
+    for (int i = 0; i < 3; ++i) {
+        sir_epidemic_EACH_LANE
+        for (int lane = 0; lane < sir_epidemic_LANES; ++lane)
+            size[lane] += fabs(delta[i][lane]) / (fabs(y[i][lane]) + norm[lane] + DBL_MIN);
+    }
+}
+
+/* Correct y by the residuals, with the inverse in the table, and measure the corrections. */
+static void sir_epidemic_correct(sir_epidemic_model *model, sir_epidemic_lanes size)
+{
+    sir_epidemic_lanes delta[3];
+    memset(delta, 0, sizeof delta);
+    for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j) {
+            sir_epidemic_EACH_LANE
+            for (int lane = 0; lane < sir_epidemic_LANES; ++lane)
+                delta[i][lane] += model->inverse[i * 3 + j][lane] * model->residual[j][lane];
+        }
+    sir_epidemic_sizes(model->y, delta, size);
+    for (int i = 0; i < 3; ++i)
+        for (int lane = 0; lane < sir_epidemic_LANES; ++lane) model->y[i][lane] -= delta[i][lane];
+}
+
+/* The largest of the lanes, none of which is negative; infinite if one is not finite. As integers, the bits of such
+   numbers have their order, and those of what is no number are larger. */
+static double sir_epidemic_largest(const sir_epidemic_lanes size)
+{
+    uint64_t bits[8], most = 0;
+    double largest;
+    memcpy(bits, size, sizeof bits);
+    for (int lane = 0; lane < sir_epidemic_LANES; ++lane) most = bits[lane] > most ? bits[lane] : most;
+    memcpy(&largest, &most, sizeof largest);
+    return isfinite(largest) ? largest : HUGE_VAL;
+}
+
+/* sir_epidemic_near for the guesses of all lanes, seen from one value. */
+static int sir_epidemic_near_lanes(sir_epidemic_lanes y[restrict 3], const double last[3])
+{
+    sir_epidemic_lanes distance = { 0.0 };
+    double size = 0.0;
+    for (int i = 0; i < 3; ++i) {
+        size += fabs(last[i]);
+        sir_epidemic_EACH_LANE
+        for (int lane = 0; lane < sir_epidemic_LANES; ++lane) distance[lane] += fabs(y[i][lane] - last[i]);
+    }
+    return sir_epidemic_largest(distance) <= 4.0 * size;
+}
+
+/* What is left after a correction of this size: quadratic in it, where the matrices are of the points corrected; where
+   they are of points further off, by bend, also of the order of size times bend. bound is what the last pass left. */
+static double sir_epidemic_remaining(double size, double bend, double bound)
+{
+    const double growth = size / bound, left = size * (size + bend);
+    return growth > 1.0 ? growth * left : left;
+}
+
+/* The paths of all lanes as Taylor series about their middle, with half of p: they take the time from -1 to 1, and need
+   fewer terms than from their start. s[i][k] is coefficient k of series i, the coordinates first; slope goes on with the
+   entries of d(pi p)/dm and of pi, from which v follows, the derivatives along middle and p, row by row. */
+typedef struct {
+    sir_epidemic_lanes p[3], fixed[1], slope_fixed[1], value[10];
+    sir_epidemic_lanes s[10][16 + 1], slope[13][12 + 1];
+    sir_epidemic_lanes v[12 + 1][18];
+    sir_epidemic_lanes even[3], odd[3], mean[3]; /* sums of terms, those of even order also as means over time */
+    sir_epidemic_lanes v_even[18], v_odd[18], v_mean[18];
+    sir_epidemic_lanes unit[3]; /* what terms are measured by */
+    int terms; /* orders that are known */
+} sir_epidemic_expansion;
+
+/* The largest of the lanes; what is not finite does not count: that lane has failed. */
+static double sir_epidemic_largest_finite(const sir_epidemic_lanes size)
+{
+    sir_epidemic_lanes finite;
+    for (int lane = 0; lane < sir_epidemic_LANES; ++lane) finite[lane] = size[lane] <= DBL_MAX ? size[lane] : 0.0;
+    return sir_epidemic_largest(finite);
+}
+
+/* Coefficient k >= 1 of the series that follow from those of the coordinates: sums over the orders between 0 and k, then what else there is. */
+static void sir_epidemic_follow(sir_epidemic_lanes coef[restrict], sir_epidemic_expansion *e, int k)
+{
+    const double share = 1.0 / k;
+    sir_epidemic_lanes sum[1];
+    (void)coef, (void)e, (void)share;
+    memset(sum, 0, sizeof sum);
+    for (int j = 1; j < k; ++j) {
+        sir_epidemic_EACH_LANE
+        for (int lane = 0; lane < sir_epidemic_LANES; ++lane) {
+            sum[0][lane] += e->s[1][j][lane] * e->s[0][k - j][lane];
+        }
+    }
+    sir_epidemic_EACH_LANE
+    for (int lane = 0; lane < sir_epidemic_LANES; ++lane) {
+        e->s[3][k][lane] = sum[0][lane] + e->s[1][0][lane] * e->s[0][k][lane] + e->s[1][k][lane] * e->s[0][0][lane];
+        e->s[4][k][lane] = e->p[1][lane] * e->s[3][k][lane];
+        e->s[5][k][lane] = e->p[2][lane] * e->s[3][k][lane];
+        e->s[6][k][lane] = e->s[4][k][lane] - e->s[5][k][lane];
+        e->s[7][k][lane] = e->p[0][lane] * e->s[3][k][lane];
+        e->s[8][k][lane] = e->s[5][k][lane] - e->s[7][k][lane];
+        e->s[9][k][lane] = e->s[7][k][lane] - e->s[4][k][lane];
+    }
+}
+
+/* Coefficient k >= 1 of the further series: sums over the orders between 0 and k, then what else there is. */
+static void sir_epidemic_follow_slopes(sir_epidemic_lanes coef[restrict], sir_epidemic_expansion *e, int k)
+{
+    const double share = 1.0 / k;
+    sir_epidemic_lanes sum[1];
+    (void)coef, (void)e, (void)share;
+    memset(sum, 0, sizeof sum);
+    for (int j = 1; j < k; ++j) {
+    }
+    sir_epidemic_EACH_LANE
+    for (int lane = 0; lane < sir_epidemic_LANES; ++lane) {
+        e->slope[0][k][lane] = e->p[1][lane] * e->s[1][k][lane];
+        e->slope[1][k][lane] = e->p[2][lane] * e->s[1][k][lane];
+        e->slope[2][k][lane] = e->slope[0][k][lane] - e->slope[1][k][lane];
+        e->slope[3][k][lane] = e->p[1][lane] * e->s[0][k][lane];
+        e->slope[4][k][lane] = e->p[2][lane] * e->s[0][k][lane];
+        e->slope[5][k][lane] = e->slope[3][k][lane] - e->slope[4][k][lane];
+        e->slope[6][k][lane] = e->p[0][lane] * e->s[1][k][lane];
+        e->slope[7][k][lane] = e->slope[1][k][lane] - e->slope[6][k][lane];
+        e->slope[8][k][lane] = e->p[0][lane] * e->s[0][k][lane];
+        e->slope[9][k][lane] = e->slope[4][k][lane] - e->slope[8][k][lane];
+        e->slope[10][k][lane] = e->slope[6][k][lane] - e->slope[0][k][lane];
+        e->slope[11][k][lane] = e->slope[8][k][lane] - e->slope[3][k][lane];
+        e->slope[12][k][lane] = -e->s[3][k][lane];
+    }
+}
+
+/* Order k of the series, and with it order k + 1 of the coordinates. */
+static void sir_epidemic_next_order(sir_epidemic_lanes coef[restrict], sir_epidemic_expansion *e, int k)
+{
+    static const int field[3] = { 6, 8, 9 };
+    if (k > 0) sir_epidemic_follow(coef, e, k);
+    for (int i = 0; i < 3; ++i) {
+        const double share = 1.0 / (k + 1);
+        sir_epidemic_EACH_LANE
+        for (int lane = 0; lane < sir_epidemic_LANES; ++lane) e->s[i][k + 1][lane] = share * e->s[field[i]][k][lane];
+    }
+}
+
+/* Begin to expand the paths with the middles m. */
+static void sir_epidemic_begin(sir_epidemic_lanes coef[restrict], sir_epidemic_expansion *e, sir_epidemic_lanes m[restrict 3])
+{
+    sir_epidemic_lanes norm = { 0.0 };
+    sir_epidemic_values_lanes(coef, e->p, m, e->value, e->fixed);
+    for (int i = 0; i < 10; ++i) memcpy(e->s[i][0], e->value[i], sizeof e->value[i]);
+    memset(e->even, 0, sizeof e->even);
+    memset(e->odd, 0, sizeof e->odd);
+    memset(e->mean, 0, sizeof e->mean);
+    sir_epidemic_next_order(coef, e, 0);
+    e->terms = 0;
+    for (int i = 0; i < 3; ++i) {
+        sir_epidemic_EACH_LANE
+        for (int lane = 0; lane < sir_epidemic_LANES; ++lane) {
+            e->unit[i][lane] = fabs(m[i][lane]) + fabs(e->s[i][1][lane]) + DBL_MIN;
+            norm[lane] += e->unit[i][lane];
+        }
+    }
+    for (int i = 0; i < 3; ++i)
+        for (int lane = 0; lane < sir_epidemic_LANES; ++lane) e->unit[i][lane] = 1.0 / (e->unit[i][lane] + 1e-5 * norm[lane]);
+}
+
+/* Add the terms of the odd order k and of the next. */
+static void sir_epidemic_add_terms(sir_epidemic_expansion *e, int k, sir_epidemic_lanes size)
+{
+    const double share = 1.0 / (k + 2);
+    memset(size, 0, sir_epidemic_LANES * sizeof size[0]);
+    for (int i = 0; i < 3; ++i) {
+        sir_epidemic_EACH_LANE
+        for (int lane = 0; lane < sir_epidemic_LANES; ++lane) {
+            const double odd = e->s[i][k][lane], even = e->s[i][k + 1][lane];
+            e->odd[i][lane] += odd;
+            e->even[i][lane] += even;
+            e->mean[i][lane] += share * even;
+            size[lane] += (fabs(odd) + fabs(even)) * e->unit[i][lane];
+        }
+    }
+}
+
+/* Go on by two orders at a time, until these are below accuracy in all lanes that are finite. Where 16 terms do not
+   suffice, the path is too long to be followed here: infinite. */
+static void sir_epidemic_extend(sir_epidemic_lanes coef[restrict], sir_epidemic_expansion *e, double accuracy)
+{
+    sir_epidemic_lanes size;
+    double largest = HUGE_VAL;
+    for (; e->terms < 16 && largest > accuracy; e->terms += 2) {
+        if (e->terms > 0) sir_epidemic_next_order(coef, e, e->terms);
+        sir_epidemic_next_order(coef, e, e->terms + 1);
+        sir_epidemic_add_terms(e, e->terms + 1, size);
+        largest = sir_epidemic_largest_finite(size);
+    }
+    for (int lane = 0; lane < sir_epidemic_LANES && largest > accuracy; ++lane)
+        if (size[lane] > accuracy) e->mean[0][lane] = HUGE_VAL;
+}
+
+/* sir_epidemic_holds at one end of the paths, time 1 or -1, in all lanes: infinite where the equation does not hold. */
+static void sir_epidemic_check_end(sir_epidemic_lanes coef[restrict], sir_epidemic_expansion *e, double time,
+    sir_epidemic_lanes wrong)
+{
+    static const int field[3] = { 6, 8, 9 };
+    sir_epidemic_lanes m[3], slope[3], value[10], fixed[1], scale = { 0.0 };
+    memset(slope, 0, sizeof slope);
+    for (int i = 0; i < 3; ++i) {
+        double power = 1.0;
+        for (int k = 1; k <= e->terms; ++k, power *= time) {
+            sir_epidemic_EACH_LANE
+            for (int lane = 0; lane < sir_epidemic_LANES; ++lane) slope[i][lane] += k * power * e->s[i][k][lane];
+        }
+        sir_epidemic_EACH_LANE
+        for (int lane = 0; lane < sir_epidemic_LANES; ++lane) {
+            m[i][lane] = e->s[i][0][lane] + (e->even[i][lane] + time * e->odd[i][lane]);
+            scale[lane] += fabs(m[i][lane]) + fabs(slope[i][lane]);
+        }
+    }
+    sir_epidemic_values_lanes(coef, e->p, m, value, fixed);
+    for (int i = 0; i < 3; ++i)
+        for (int lane = 0; lane < sir_epidemic_LANES; ++lane) {
+            const double off = fabs(value[field[i]][lane] - slope[i][lane]);
+            wrong[lane] += off <= 2e-15 * scale[lane] ? 0.0 : HUGE_VAL;
+        }
+}
+
+/* Begin to expand the paths with mean y, from their middles as far as these are known. */
+static void sir_epidemic_begin_at(sir_epidemic_lanes coef[restrict], const sir_epidemic_model *model, sir_epidemic_expansion *e)
+{
+    sir_epidemic_lanes m[3];
+    for (int i = 0; i < 3; ++i)
+        for (int lane = 0; lane < sir_epidemic_LANES; ++lane) m[i][lane] = model->y[i][lane] + model->middle[i][lane];
+    sir_epidemic_begin(coef, e, m);
+}
+
+/* Find the middles by iteration, which gains some digits each time, with expansions as short as that allows; the last
+   can be gone on with. Infinite where that does not converge. */
+static void sir_epidemic_settle(sir_epidemic_lanes coef[restrict], sir_epidemic_model *model, sir_epidemic_expansion *e)
+{
+    sir_epidemic_lanes size, norm;
+    double left = 1.0;
+    memset(model->middle, 0, sizeof model->middle);
+    for (int round = 0; left > 1e-9 && round < 12; ++round) {
+        for (int i = 0; i < 3 && round > 0; ++i)
+            for (int lane = 0; lane < sir_epidemic_LANES; ++lane) model->middle[i][lane] = -e->mean[i][lane];
+        sir_epidemic_begin_at(coef, model, e);
+        sir_epidemic_extend(coef, e, 1e-4 * left);
+        for (int lane = 0; lane < sir_epidemic_LANES; ++lane) size[lane] = 0.0, norm[lane] = DBL_MIN;
+        for (int i = 0; i < 3; ++i) {
+            sir_epidemic_EACH_LANE
+            for (int lane = 0; lane < sir_epidemic_LANES; ++lane) {
+                size[lane] += fabs(model->middle[i][lane] + e->mean[i][lane]);
+                norm[lane] += fabs(model->y[i][lane]);
+            }
+        }
+        for (int lane = 0; lane < sir_epidemic_LANES; ++lane) size[lane] /= norm[lane];
+        left = sir_epidemic_largest_finite(size);
+        if (left > 1.0) left = 1.0;
+    }
+    for (int lane = 0; lane < sir_epidemic_LANES && left > 1e-9; ++lane)
+        if (size[lane] > 1e-9) model->middle[0][lane] = HUGE_VAL;
+}
+
+/* Half of p: paths take the time from -1 to 1. */
+static void sir_epidemic_halve(sir_epidemic_lanes p[restrict 3])
+{
+    for (int i = 0; i < 3; ++i)
+        for (int lane = 0; lane < sir_epidemic_LANES; ++lane) p[i][lane] *= 0.5;
+}
+
+/* alpha - y and beta - alpha to leading order, from one short expansion. */
+static void sir_epidemic_evaluate_lanes(sir_epidemic_lanes coef[restrict], sir_epidemic_lanes y[restrict 3],
+    sir_epidemic_lanes displacement[restrict 3], sir_epidemic_lanes increment[restrict 3])
+{
+    sir_epidemic_expansion e;
+    sir_epidemic_momentum_lanes(coef, y, e.p);
+    sir_epidemic_halve(e.p);
+    sir_epidemic_begin(coef, &e, y);
+    sir_epidemic_extend(coef, &e, 1e-6);
+    for (int i = 0; i < 3; ++i)
+        for (int lane = 0; lane < sir_epidemic_LANES; ++lane) {
+            displacement[i][lane] = (e.even[i][lane] - e.odd[i][lane]) - e.mean[i][lane];
+            increment[i][lane] = 2.0 * e.odd[i][lane];
+        }
+}
+
+/* What order j of d(pi p)/dm contributes to order k + 1 of the derivatives. */
+static void sir_epidemic_vary_by(sir_epidemic_expansion *e, int j, int k)
+{
+    sir_epidemic_lanes *from = e->v[k - j], *to = e->v[k + 1];
+    sir_epidemic_EACH_LANE
+    for (int lane = 0; lane < sir_epidemic_LANES; ++lane) {
+        const double a00 = e->slope[2][j][lane];
+        const double a01 = e->slope[5][j][lane];
+        const double a10 = e->slope[7][j][lane];
+        const double a11 = e->slope[9][j][lane];
+        const double a20 = e->slope[10][j][lane];
+        const double a21 = e->slope[11][j][lane];
+        to[0][lane] += a00 * from[0][lane] + a01 * from[6][lane];
+        to[1][lane] += a00 * from[1][lane] + a01 * from[7][lane];
+        to[2][lane] += a00 * from[2][lane] + a01 * from[8][lane];
+        to[3][lane] += a00 * from[3][lane] + a01 * from[9][lane];
+        to[4][lane] += a00 * from[4][lane] + a01 * from[10][lane];
+        to[5][lane] += a00 * from[5][lane] + a01 * from[11][lane];
+        to[6][lane] += a10 * from[0][lane] + a11 * from[6][lane];
+        to[7][lane] += a10 * from[1][lane] + a11 * from[7][lane];
+        to[8][lane] += a10 * from[2][lane] + a11 * from[8][lane];
+        to[9][lane] += a10 * from[3][lane] + a11 * from[9][lane];
+        to[10][lane] += a10 * from[4][lane] + a11 * from[10][lane];
+        to[11][lane] += a10 * from[5][lane] + a11 * from[11][lane];
+        to[12][lane] += a20 * from[0][lane] + a21 * from[6][lane];
+        to[13][lane] += a20 * from[1][lane] + a21 * from[7][lane];
+        to[14][lane] += a20 * from[2][lane] + a21 * from[8][lane];
+        to[15][lane] += a20 * from[3][lane] + a21 * from[9][lane];
+        to[16][lane] += a20 * from[4][lane] + a21 * from[10][lane];
+        to[17][lane] += a20 * from[5][lane] + a21 * from[11][lane];
+    }
+}
+
+/* Order k + 1 of the derivatives; order 0 is 1 along the middle, and 0 along p. */
+static void sir_epidemic_vary_order(sir_epidemic_expansion *e, int k)
+{
+    sir_epidemic_lanes *to = e->v[k + 1];
+    memset(to, 0, 18 * sizeof to[0]);
+    sir_epidemic_EACH_LANE
+    for (int lane = 0; lane < sir_epidemic_LANES; ++lane) {
+        to[0][lane] += e->slope[2][k][lane];
+        to[1][lane] += e->slope[5][k][lane];
+        to[6][lane] += e->slope[7][k][lane];
+        to[7][lane] += e->slope[9][k][lane];
+        to[12][lane] += e->slope[10][k][lane];
+        to[13][lane] += e->slope[11][k][lane];
+        to[4][lane] += 0.5 * e->s[3][k][lane];
+        to[5][lane] += 0.5 * e->slope[12][k][lane];
+        to[9][lane] += 0.5 * e->slope[12][k][lane];
+        to[11][lane] += 0.5 * e->s[3][k][lane];
+        to[15][lane] += 0.5 * e->s[3][k][lane];
+        to[16][lane] += 0.5 * e->slope[12][k][lane];
+    }
+    for (int j = 0; j < k; ++j) sir_epidemic_vary_by(e, j, k);
+    for (int i = 0; i < 18; ++i) {
+        const double share = 1.0 / (k + 1);
+        sir_epidemic_EACH_LANE
+        for (int lane = 0; lane < sir_epidemic_LANES; ++lane) to[i][lane] *= share;
+    }
+}
+
+/* Add the terms of the odd order k of the derivatives and of the next, and measure them: those along the middle beside 1,
+   those along p beside their first. */
+static void sir_epidemic_add_slopes(sir_epidemic_expansion *e, int k, sir_epidemic_lanes size)
+{
+    sir_epidemic_lanes parts[2] = { { 0.0 } }, first = { 0.0 };
+    const double share = 1.0 / (k + 2);
+    for (int i = 0; i < 18; ++i) {
+        const int part = i % 6 / 3;
+        sir_epidemic_EACH_LANE
+        for (int lane = 0; lane < sir_epidemic_LANES; ++lane) {
+            const double odd = e->v[k][i][lane], even = e->v[k + 1][i][lane];
+            e->v_odd[i][lane] += odd;
+            e->v_even[i][lane] += even;
+            e->v_mean[i][lane] += share * even;
+            parts[part][lane] += fabs(odd) + fabs(even);
+            first[lane] += fabs(e->v[1][i][lane]);
+        }
+    }
+    for (int lane = 0; lane < sir_epidemic_LANES; ++lane)
+        size[lane] = parts[0][lane] + parts[1][lane] / (first[lane] + DBL_MIN);
+}
+
+/* The derivatives of the paths along their middles and p, to seven digits: what that leaves of a correction is below
+   rounding when it is accepted. Infinite where 12 terms do not suffice. */
+static void sir_epidemic_vary(sir_epidemic_lanes coef[restrict], sir_epidemic_expansion *e)
+{
+    sir_epidemic_lanes slope[13], size;
+    double largest = HUGE_VAL;
+    sir_epidemic_slope_values_lanes(coef, e->p, e->value, e->fixed, slope, e->slope_fixed);
+    for (int i = 0; i < 13; ++i) memcpy(e->slope[i][0], slope[i], sizeof slope[i]);
+    memset(e->v_even, 0, sizeof e->v_even);
+    memset(e->v_odd, 0, sizeof e->v_odd);
+    memset(e->v_mean, 0, sizeof e->v_mean);
+    for (int i = 0; i < 3; ++i)
+        for (int lane = 0; lane < sir_epidemic_LANES; ++lane)
+            e->v_even[i * 6 + i][lane] = e->v_mean[i * 6 + i][lane] = 1.0;
+    for (int k = 0; k < 12 && largest > 1e-07; ++k) {
+        if (k >= e->terms) sir_epidemic_next_order(coef, e, k);
+        if (k > 0) sir_epidemic_follow_slopes(coef, e, k);
+        sir_epidemic_vary_order(e, k);
+        if (k % 2 == 0) continue;
+        sir_epidemic_add_slopes(e, k, size);
+        largest = sir_epidemic_largest_finite(size);
+    }
+    for (int lane = 0; lane < sir_epidemic_LANES && largest > 1e-07; ++lane)
+        if (size[lane] > 1e-07) e->v_mean[0][lane] = HUGE_VAL;
+}
+
+/* Put the middles of the paths where they are, to first order, after y was corrected. */
+static void sir_epidemic_sway(sir_epidemic_model *model)
+{
+    for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j) {
+            sir_epidemic_EACH_LANE
+            for (int lane = 0; lane < sir_epidemic_LANES; ++lane)
+                model->middle[i][lane] += model->sway[i * 3 + j][lane] * (model->y[j][lane] - model->at[j][lane]);
+        }
+}
+
+/* alpha - y and beta - alpha from an expansion whose mean misses y by little, to first order in that. */
+static void sir_epidemic_read_ends(sir_epidemic_model *model, sir_epidemic_expansion *e, const sir_epidemic_lanes wrong)
+{
+    sir_epidemic_lanes miss[3];
+    for (int i = 0; i < 3; ++i) {
+        sir_epidemic_EACH_LANE
+        for (int lane = 0; lane < sir_epidemic_LANES; ++lane) {
+            miss[i][lane] = model->middle[i][lane] + e->mean[i][lane];
+            model->displacement[i][lane] = ((model->middle[i][lane] + e->even[i][lane]) - e->odd[i][lane]) + wrong[lane];
+            model->increment[i][lane] = 2.0 * e->odd[i][lane];
+            model->middle[i][lane] = -e->mean[i][lane];
+            model->at[i][lane] = model->y[i][lane];
+        }
+    }
+    for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j) {
+            sir_epidemic_EACH_LANE
+            for (int lane = 0; lane < sir_epidemic_LANES; ++lane) {
+                model->displacement[i][lane] -= model->alpha_y[i * 3 + j][lane] * miss[j][lane];
+                model->increment[i][lane] -= model->increment_y[i * 3 + j][lane] * miss[j][lane];
+            }
+        }
+}
+
+/* The matrices of a stage, from the derivatives of the paths and the Hessian of S_h. */
+static void sir_epidemic_linearise_paths(sir_epidemic_lanes coef[restrict], sir_epidemic_model *model, sir_epidemic_expansion *e,
+    sir_epidemic_lanes hessian[restrict 9])
+{
+    sir_epidemic_lanes jacobian[9], reciprocal[2 * 3];
+    sir_epidemic_vary(coef, e);
+    sir_epidemic_along_mean_lanes(e->v_even, e->v_odd, e->v_mean, hessian, model->alpha_y, model->increment_y, jacobian,
+        model->slope, model->sway, reciprocal);
+    sir_epidemic_invert_lanes(jacobian, model->slope, model->inverse, model->gain, reciprocal + 3);
+    for (int i = 0; i < 2 * 3; ++i) {
+        sir_epidemic_EACH_LANE
+        for (int lane = 0; lane < sir_epidemic_LANES; ++lane)
+            model->inverse[i % 3][lane] += fabs(reciprocal[i][lane]) < 1e3 ? 0.0 : HUGE_VAL;
+    }
+}
+
+/* The table of a stage, with its matrices or with those of the last pass. */
+static void sir_epidemic_update(sir_epidemic_lanes coef[restrict], sir_epidemic_model *model, int matrices)
+{
+    sir_epidemic_expansion e;
+    sir_epidemic_lanes hessian[9], wrong = { 0.0 };
+    if (matrices) sir_epidemic_curvature_lanes(coef, model->y, e.p, hessian);
+    else sir_epidemic_momentum_lanes(coef, model->y, e.p);
+    sir_epidemic_halve(e.p);
+    if (matrices) {
+        sir_epidemic_settle(coef, model, &e);
+    } else {
+        sir_epidemic_sway(model);
+        sir_epidemic_begin_at(coef, model, &e);
+    }
+    sir_epidemic_extend(coef, &e, 1e-17);
+    sir_epidemic_check_end(coef, &e, 1.0, wrong);
+    sir_epidemic_check_end(coef, &e, -1.0, wrong);
+    if (matrices) sir_epidemic_linearise_paths(coef, model, &e, hessian);
+    sir_epidemic_read_ends(model, &e, wrong);
+}
+
+/* The steps of a block one after the other, each along the linear model of its lane. As X, the state with its carry, gains
+   increment - gain residual, the next residual follows from this one; X itself is added up apart. */
+static void sir_epidemic_chain(sir_epidemic_model model[1], double x[3], double carry[3])
+{
+    double residual[3], sum[3], small[3];
+    for (int i = 0; i < 3; ++i) {
+        residual[i] = ((model->y[i][0] - x[i]) + model->displacement[i][0]) - carry[i];
+        sum[i] = x[i];
+        small[i] = carry[i];
+    }
+    for (int k = 0; k < 1 * sir_epidemic_LANES; ++k) {
+        const int lane = k / 1, after = (k + 1) / 1 % sir_epidemic_LANES;
+        sir_epidemic_model *at = &model[k % 1], *next = &model[(k + 1) % 1];
+        double even[3] = { 0.0 }, odd[3] = { 0.0 }; /* two sums, so that no long chain of additions is waited for */
+        for (int i = 0; i < 3; ++i) {
+            at->residual[i][lane] = residual[i];
+            for (int j = 0; j < 3; j += 2) even[i] += at->gain[i * 3 + j][lane] * residual[j];
+            for (int j = 1; j < 3; j += 2) odd[i] += at->gain[i * 3 + j][lane] * residual[j];
+        }
+        for (int i = 0; i < 3; ++i) {
+            const double change = at->increment[i][lane], total = sum[i] + change, added = total - sum[i];
+            const double turn = (next->displacement[i][after] - at->displacement[i][lane]) - change;
+            const double moved = (next->y[i][after] - at->y[i][lane]) + turn;
+            residual[i] = ((moved + residual[i]) + odd[i]) + even[i];
+            small[i] += ((sum[i] - (total - added)) + (change - added)) - (even[i] + odd[i]);
+            sum[i] = total;
+        }
+    }
+    for (int i = 0; i < 3; ++i) {
+        x[i] = sum[i] + small[i];
+        carry[i] = small[i] - (x[i] - sum[i]);
+    }
+}
+
+/* Bring the table up to date: coefficients, and weights that were fitted since. */
+static void sir_epidemic_refresh(const sir_epidemic_solver *s, sir_epidemic_table *table)
+{
+    for (int stage = 0; stage < 1; ++stage) {
+        if (table->fits[stage] == s->memory[stage].fits) continue;
+        table->fits[stage] = s->memory[stage].fits;
+        for (int k = 0; k < 4; ++k)
+            for (int lane = 0; lane < sir_epidemic_LANES; ++lane) table->coef[stage][k][lane] = s->coef[stage][k];
+        memcpy(table->weight[stage], s->memory[stage].weight, (size_t)s->memory[stage].terms * sizeof table->weight[0][0]);
+    }
+}
+
+/* Guesses for the next sir_epidemic_LANES values of a stage, by its recurrences. */
+static void sir_epidemic_foresee(const sir_epidemic_memory *memory, sir_epidemic_lanes weight[restrict][3],
+    sir_epidemic_lanes y[restrict 3])
+{
+    const int last = memory->count - 1;
+    for (int i = 0; i < 3; ++i) {
+        sir_epidemic_lanes even = { 0.0 }, odd = { 0.0 };
+        for (int k = 0; k < memory->terms; k += 2) {
+            const double past = memory->past[last - k][i], earlier = memory->past[last - 1 - k][i];
+            sir_epidemic_EACH_LANE
+            for (int lane = 0; lane < sir_epidemic_LANES; ++lane) even[lane] += weight[k][i][lane] * past;
+            sir_epidemic_EACH_LANE
+            for (int lane = 0; lane < sir_epidemic_LANES; ++lane) odd[lane] += weight[k + 1][i][lane] * earlier;
+        }
+        sir_epidemic_EACH_LANE
+        for (int lane = 0; lane < sir_epidemic_LANES; ++lane) y[i][lane] = even[lane] + odd[lane];
+    }
+}
+
+/* sir_epidemic_record for the values of all lanes, one after the other. */
+static void sir_epidemic_record_lanes(sir_epidemic_memory *memory, sir_epidemic_lanes y[restrict 3])
+{
+    sir_epidemic_make_room(memory, sir_epidemic_LANES);
+    for (int lane = 0; lane < sir_epidemic_LANES; ++lane)
+        for (int i = 0; i < 3; ++i) memory->past[memory->count + lane][i] = y[i][lane];
+    memory->count += sir_epidemic_LANES;
+}
+
+/* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
+   method, to leading order. */
+static void sir_epidemic_march(const sir_epidemic_solver *s, sir_epidemic_table *table, sir_epidemic_model model[1])
+{
+    static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
+    double x[3], point[3], slope[3], mean[3];
+    memcpy(x, s->x, sizeof x);
+    for (int k = 0; k < 1 * sir_epidemic_LANES; ++k) {
+        const double h = sir_epidemic_fractions[k % 1] * s->h;
+        memcpy(point, x, sizeof x);
+        memset(mean, 0, sizeof mean);
+        for (int part = 0; part < 4; ++part) {
+            sir_epidemic_vector_field(&s->params, point, slope);
+            for (int i = 0; i < 3; ++i) {
+                mean[i] += weight[part] * slope[i];
+                point[i] = x[i] + h * reach[part] * slope[i];
+            }
+        }
+        for (int i = 0; i < 3; ++i) {
+            model[k % 1].y[i][k / 1] = x[i] + 0.5 * h * mean[i];
+            x[i] += h * mean[i];
+        }
+    }
+    for (int stage = 0; stage < 1; ++stage) {
+        sir_epidemic_model *at = &model[stage];
+        sir_epidemic_evaluate_lanes(table->coef[stage], at->y, at->displacement, at->increment);
+        for (int i = 0; i < 3; ++i) {
+            sir_epidemic_EACH_LANE
+            for (int lane = 0; lane < sir_epidemic_LANES; ++lane)
+                at->y[i][lane] -= at->displacement[i][lane] + 0.5 * at->increment[i][lane];
+        }
+    }
+}
+
+/* sir_epidemic_LANES steps at once: guess the points of all, and correct them together until the error that remains is as
+   small as after a single step. How many passes that took; 0, and the solver as before, where it takes more than most. */
+static int sir_epidemic_block(sir_epidemic_solver *s, sir_epidemic_table *table, int most)
+{
+    sir_epidemic_model model[1];
+    sir_epidemic_lanes sizes;
+    double x[3], carry[3], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
+    int passes = 0, solved = 0;
+    if (!s->foreseeing) sir_epidemic_march(s, table, model);
+    for (int stage = 0; stage < 1; ++stage) {
+        if (s->foreseeing) sir_epidemic_foresee(&s->memory[stage], table->weight[stage], model[stage].y);
+        if (!sir_epidemic_near_lanes(model[stage].y, s->x)) return 0;
+    }
+    while (!solved) {
+        double size = 0.0;
+        const int matrices = previous > 1e-05;
+        for (int stage = 0; stage < 1; ++stage) sir_epidemic_update(table->coef[stage], &model[stage], matrices);
+        memcpy(x, s->x, sizeof x);
+        memcpy(carry, s->carry, sizeof carry);
+        sir_epidemic_chain(model, x, carry);
+        for (int stage = 0; stage < 1; ++stage) {
+            sir_epidemic_correct(&model[stage], sizes);
+            const double largest = sir_epidemic_largest(sizes);
+            size = largest > size ? largest : size;
+        }
+        s->evaluations += 1 * sir_epidemic_LANES;
+        bend = matrices ? 0.0 : bend + previous;
+        bound = sir_epidemic_remaining(size, bend, bound);
+        /* The second test: after the square of so small a correction there is rounding only. */
+        solved = bound <= 1e-20 || (previous < 1e-8 && size < 1e-10);
+        if ((++passes >= most || !(size < previous)) && !solved) return 0;
+        previous = size;
+    }
+    for (int i = 0; i < 3; ++i)
+        if (!isfinite(x[i])) return 0;
+    memcpy(s->x, x, sizeof x);
+    memcpy(s->carry, carry, sizeof carry);
+    s->steps += sir_epidemic_LANES;
+    for (int stage = 0; stage < 1; ++stage) {
+        sir_epidemic_memory *memory = &s->memory[stage];
+        sir_epidemic_record_lanes(memory, model[stage].y);
+        memory->slow = passes > 1 ? memory->slow + sir_epidemic_LANES : 0;
+        if (memory->slow > memory->patience && s->foreseeing) sir_epidemic_fit(memory);
+    }
+    return passes;
+}
+
+/* How the next block is guessed: by recurrences, fitted as soon as enough steps are to be made, or
+   have been, to repay that. */
+static void sir_epidemic_choose_guess(sir_epidemic_solver *s, size_t steps)
+{
+    for (int stage = 0; stage < 1; ++stage)
+        if (s->memory[stage].count < 95) {
+            s->foreseeing = 0;
+            return;
+        }
+    if (s->foreseeing || (steps < 600 && s->steps < 150) || s->steps < s->retry) return;
+    for (int stage = 0; stage < 1; ++stage) sir_epidemic_fit(&s->memory[stage]);
+    s->foreseeing = 1;
+    s->pause = sir_epidemic_LANES;
+}
+
+/* Learn from a block: after one that failed single steps are made, the more the more often that happens. Recurrences
+   that fail repeatedly, or need more passes than steps by Runge-Kutta did, are given up for a while. */
+static void sir_epidemic_learn_from(sir_epidemic_solver *s, int passes)
+{
+    if (passes > 0) {
+        s->setback /= 2;
+    } else {
+        s->setback = 2 * s->setback + sir_epidemic_LANES > 1000 ? 1000 : 2 * s->setback + sir_epidemic_LANES;
+        s->pause = s->setback;
+    }
+    if (!s->foreseeing) {
+        s->passes = passes > 0 ? passes : INT_MAX;
+    } else if (passes > s->passes || s->setback > 5 * sir_epidemic_LANES) {
+        s->foreseeing = s->setback = s->pause = 0;
+        s->doubt = 2 * s->doubt + 600;
+        s->retry = s->steps + s->doubt;
+    }
+}
+
+/* A single step, and the running mean of the evaluations that a stage of one takes. */
+static sir_epidemic_status sir_epidemic_single(sir_epidemic_solver *s)
+{
+    const size_t before = s->evaluations;
+    const sir_epidemic_status status = sir_epidemic_step(s, s->h);
+    s->effort += 0.125 * ((double)(s->evaluations - before) / 1 - s->effort);
+    return status;
+}
+
+/* Blocks of steps where they cost less than single steps, with at most as many passes over a block as 1 for each
+   evaluation in a single step. The results differ by round-off only. */
 sir_epidemic_status sir_epidemic_integrate(sir_epidemic_solver *s, double h, size_t steps)
 {
-    for (size_t k = 0; k < steps; ++k) {
-        const sir_epidemic_status status = sir_epidemic_step(s, h);
-        if (status != sir_epidemic_OK) return status;
+    sir_epidemic_table table;
+    sir_epidemic_status status = sir_epidemic_set_step(s, h);
+    for (int stage = 0; stage < 1; ++stage) table.fits[stage] = -1;
+    while (status == sir_epidemic_OK && steps > 0) {
+        if (steps >= sir_epidemic_LANES && s->pause == 0) sir_epidemic_choose_guess(s, steps);
+        if (steps >= sir_epidemic_LANES && s->pause == 0) {
+            sir_epidemic_refresh(s, &table);
+            const int passes = sir_epidemic_block(s, &table, (int)(1 * s->effort + 0.5));
+            sir_epidemic_learn_from(s, passes);
+            if (passes > 0) steps -= sir_epidemic_LANES;
+        } else {
+            if (s->pause > 0) --s->pause;
+            status = sir_epidemic_single(s);
+            if (status == sir_epidemic_OK) --steps;
+        }
     }
-    return sir_epidemic_OK;
+    return status;
+}
+
+/* Members of an ensemble, each in its lane. */
+typedef struct {
+    sir_epidemic_lanes x[3], carry[3], coef[1][4];
+    sir_epidemic_lanes past[1][95][3]; /* solved values, in a ring */
+    sir_epidemic_lanes weight[1][32][3]; /* of past values, the latest first, for the next */
+    int latest;     /* the row of the latest values */
+    int count;      /* rows in use */
+    int order[1];   /* how many of them the extrapolation uses */
+    int terms[1];   /* how many of them the recurrences use */
+    int fits;       /* how often recurrences have been fitted */
+    int fitting[1]; /* whether they are the better guess */
+    int slow;       /* how many of the last steps took more than one iteration */
+    int patience;   /* how many of those before recurrences are fitted again */
+    int active[8];  /* whether the lane has a member that has not failed */
+    size_t left[8]; /* steps that it has still to make */
+} sir_epidemic_group;
+
+/* The past values of a stage, the latest for k = 0. */
+static sir_epidemic_lanes *sir_epidemic_group_past(sir_epidemic_group *group, int stage, int k)
+{
+    return group->past[stage][(group->latest + k) % 95];
+}
+
+/* Guess the values of a stage by the recurrences of the members. */
+static void sir_epidemic_group_foresee(sir_epidemic_group *group, int stage, sir_epidemic_lanes y[restrict 3])
+{
+    memset(y, 0, 3 * sizeof y[0]);
+    for (int k = 0; k < group->terms[stage]; ++k) {
+        sir_epidemic_lanes *past = sir_epidemic_group_past(group, stage, k), *weight = group->weight[stage][k];
+        for (int i = 0; i < 3; ++i) {
+            sir_epidemic_EACH_LANE
+            for (int lane = 0; lane < sir_epidemic_LANES; ++lane) y[i][lane] += weight[i][lane] * past[i][lane];
+        }
+    }
+}
+
+/* Extrapolate the values of a stage. */
+static void sir_epidemic_group_extrapolate(sir_epidemic_group *group, int stage, sir_epidemic_lanes y[restrict 3])
+{
+    const int order = group->order[stage];
+    double binomial = -1.0;
+    memcpy(y, group->x, 3 * sizeof y[0]);
+    if (order > 0) memset(y, 0, 3 * sizeof y[0]);
+    for (int k = 0; k < order; ++k) {
+        sir_epidemic_lanes *past = sir_epidemic_group_past(group, stage, k);
+        binomial *= -(double)(order - k) / (k + 1);
+        for (int i = 0; i < 3; ++i) {
+            sir_epidemic_EACH_LANE
+            for (int lane = 0; lane < sir_epidemic_LANES; ++lane) y[i][lane] += binomial * past[i][lane];
+        }
+    }
+}
+
+/* The sum over members of the absolute values of all components. */
+static double sir_epidemic_group_sum(const sir_epidemic_group *group, sir_epidemic_lanes y[3])
+{
+    double sum = 0.0;
+    for (int i = 0; i < 3; ++i)
+        for (int lane = 0; lane < sir_epidemic_LANES; ++lane) sum += group->active[lane] ? fabs(y[i][lane]) : 0.0;
+    return sum;
+}
+
+static void sir_epidemic_group_subtract(sir_epidemic_lanes y[restrict 3], sir_epidemic_lanes other[restrict 3])
+{
+    for (int i = 0; i < 3; ++i) {
+        sir_epidemic_EACH_LANE
+        for (int lane = 0; lane < sir_epidemic_LANES; ++lane) y[i][lane] -= other[i][lane];
+    }
+}
+
+/* Choose the guess that would have been best for these values. */
+static void sir_epidemic_group_judge(sir_epidemic_group *group, int stage, sir_epidemic_lanes y[3])
+{
+    sir_epidemic_lanes row[8 + 1][3];
+    const int rows = group->count < 8 ? group->count : 8;
+    double least = HUGE_VAL;
+    memcpy(row[0], y, sizeof row[0]);
+    for (int k = 0; k < rows; ++k) memcpy(row[k + 1], sir_epidemic_group_past(group, stage, k), sizeof row[0]);
+    if (group->order[stage] == 0) group->order[stage] = 1;
+    for (int order = 1; order <= rows; ++order) { /* row[0] becomes the backward difference of this order */
+        for (int k = 0; k <= rows - order; ++k) sir_epidemic_group_subtract(row[k], row[k + 1]);
+        const double size = sir_epidemic_group_sum(group, row[0]);
+        if (size < least) {
+            least = size;
+            group->order[stage] = order;
+        }
+    }
+    if (group->fits == 0) return;
+    sir_epidemic_group_foresee(group, stage, row[0]);
+    sir_epidemic_group_subtract(row[0], y);
+    group->fitting[stage] = sir_epidemic_group_sum(group, row[0]) <= least;
+}
+
+/* Fit the recurrences of all members; with every time, wait longer before it is done again, and for long if it did not
+   help. */
+static void sir_epidemic_group_fit(sir_epidemic_group *group)
+{
+    sir_epidemic_memory memory;
+    const int helped = group->fits == 0 || group->fitting[0];
+    memory.count = 95;
+    for (int stage = 0; stage < 1; ++stage) {
+        group->terms[stage] = 0;
+        for (int lane = 0; lane < sir_epidemic_LANES; ++lane)
+            for (int i = 0; i < 3 && group->active[lane]; ++i) {
+                for (int k = 0; k < 95; ++k)
+                    memory.past[95 - 1 - k][i] = sir_epidemic_group_past(group, stage, k)[i][lane];
+                const int terms = sir_epidemic_train(&memory, i);
+                if (terms > group->terms[stage]) group->terms[stage] = terms;
+                for (int k = 0; k < 32; ++k) group->weight[stage][k][i][lane] = memory.weight[k][i][0];
+            }
+        group->fitting[stage] = 1;
+    }
+    ++group->fits;
+    group->slow = 0;
+    group->patience = helped && group->patience < 10000 ? 2 * group->patience + 150 : 100 * 150;
+}
+
+/* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group.
+   bound is what remains in each lane. */
+static int sir_epidemic_group_open(sir_epidemic_group *group, const sir_epidemic_lanes size, const sir_epidemic_lanes previous,
+    double bend, sir_epidemic_lanes bound)
+{
+    int open = 0;
+    for (int lane = 0; lane < sir_epidemic_LANES; ++lane) {
+        bound[lane] = sir_epidemic_remaining(size[lane], bend, bound[lane]);
+        const int solved = bound[lane] <= 1e-20 || (previous[lane] < 1e-8 && size[lane] < 1e-10);
+        if (!isfinite(size[lane])) group->active[lane] = 0;
+        open += group->active[lane] && !solved;
+    }
+    return open;
+}
+
+/* The guess for a stage: recurrences, or extrapolation; the state for members where that is not near. */
+static void sir_epidemic_group_predict(sir_epidemic_group *group, int stage, sir_epidemic_lanes y[3])
+{
+    if (group->fitting[stage]) sir_epidemic_group_foresee(group, stage, y);
+    else sir_epidemic_group_extrapolate(group, stage, y);
+    for (int lane = 0; lane < sir_epidemic_LANES; ++lane) {
+        double guess[3], state[3];
+        for (int i = 0; i < 3; ++i) {
+            guess[i] = y[i][lane];
+            state[i] = group->x[i][lane];
+        }
+        const int near = sir_epidemic_near(guess, state);
+        for (int i = 0; i < 3 && !near; ++i) y[i][lane] = state[i];
+    }
+}
+
+/* Newton's method for a stage, until the slowest lane is solved. The number of iterations; where that is the most
+   allowed, lanes that are not solved leave the group. */
+static int sir_epidemic_group_solve(sir_epidemic_group *group, int stage, sir_epidemic_model *model)
+{
+    sir_epidemic_lanes size, previous, bound;
+    double largest = HUGE_VAL, bend = 0.0;
+    int iterations = 0, open = 1;
+    for (int lane = 0; lane < sir_epidemic_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
+    sir_epidemic_group_predict(group, stage, model->y);
+    for (; open > 0 && iterations < 20; ++iterations) {
+        memcpy(previous, size, sizeof size);
+        sir_epidemic_update(group->coef[stage], model, largest > 1e-05);
+        bend = largest > 1e-05 ? 0.0 : bend + largest;
+        for (int i = 0; i < 3; ++i) {
+            sir_epidemic_EACH_LANE
+            for (int lane = 0; lane < sir_epidemic_LANES; ++lane)
+                model->residual[i][lane] =
+                    ((model->y[i][lane] - group->x[i][lane]) + model->displacement[i][lane]) - group->carry[i][lane];
+        }
+        sir_epidemic_correct(model, size);
+        open = sir_epidemic_group_open(group, size, previous, bend, bound);
+        largest = sir_epidemic_largest(size);
+    }
+    for (int lane = 0; lane < sir_epidemic_LANES && open > 0; ++lane)
+        group->active[lane] = group->active[lane] && bound[lane] <= 1e-20;
+    return iterations;
+}
+
+/* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
+static void sir_epidemic_group_advance(sir_epidemic_lanes x[restrict 3], sir_epidemic_lanes carry[restrict 3],
+    sir_epidemic_model *model)
+{
+    for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j) {
+            sir_epidemic_EACH_LANE
+            for (int lane = 0; lane < sir_epidemic_LANES; ++lane)
+                carry[i][lane] -= model->gain[i * 3 + j][lane] * model->residual[j][lane];
+        }
+    for (int i = 0; i < 3; ++i) {
+        sir_epidemic_EACH_LANE
+        for (int lane = 0; lane < sir_epidemic_LANES; ++lane) {
+            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
+            const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
+            x[i][lane] = sum + small;
+            carry[i][lane] = small - (x[i][lane] - sum);
+        }
+    }
+}
+
+/* One step of all members, of as many as remain. One that fails keeps its state, and leaves. How many are left. */
+static int sir_epidemic_group_step(sir_epidemic_group *group, size_t remaining)
+{
+    sir_epidemic_lanes x[3], carry[3];
+    sir_epidemic_model model;
+    const int next = (group->latest + 95 - 1) % 95;
+    int active = 0, most = 0;
+    memcpy(x, group->x, sizeof x);
+    memcpy(carry, group->carry, sizeof carry);
+    for (int stage = 0; stage < 1; ++stage) {
+        const int iterations = sir_epidemic_group_solve(group, stage, &model);
+        sir_epidemic_group_advance(group->x, group->carry, &model);
+        if (next % 8 == 0 || group->count < 8) sir_epidemic_group_judge(group, stage, model.y);
+        if (iterations > most) most = iterations;
+        memcpy(group->past[stage][next], model.y, sizeof model.y);
+    }
+    group->latest = next;
+    if (group->count < 95) ++group->count;
+    group->slow = most > 1 ? group->slow + 1 : 0;
+    if (group->slow > group->patience && group->count == 95 && remaining >= 600)
+        sir_epidemic_group_fit(group);
+    for (int lane = 0; lane < sir_epidemic_LANES; ++lane) {
+        for (int i = 0; i < 3; ++i)
+            if (!isfinite(group->x[i][lane])) group->active[lane] = 0;
+        for (int i = 0; i < 3 && !group->active[lane]; ++i) {
+            group->x[i][lane] = x[i][lane];
+            group->carry[i][lane] = carry[i][lane];
+        }
+        group->left[lane] -= group->active[lane] != 0;
+        active += group->active[lane] != 0;
+    }
+    return active;
+}
+
+/* Put a member into a lane: its state, and its coefficients. */
+static sir_epidemic_status sir_epidemic_group_join(sir_epidemic_group *group, int lane, const sir_epidemic_params *params,
+    const double x0[3], double h)
+{
+    sir_epidemic_solver s;
+    sir_epidemic_status status = sir_epidemic_init(&s, params, x0);
+    if (status == sir_epidemic_OK) status = sir_epidemic_set_step(&s, h);
+    if (status != sir_epidemic_OK) return status;
+    for (int i = 0; i < 3; ++i) group->x[i][lane] = s.x[i];
+    for (int stage = 0; stage < 1; ++stage)
+        for (int k = 0; k < 4; ++k) group->coef[stage][k][lane] = s.coef[stage][k];
+    group->active[lane] = 1;
+    return status;
+}
+
+/* The steps that a member has still to make after it left the group, by itself. */
+static sir_epidemic_status sir_epidemic_group_finish(const sir_epidemic_group *group, int lane, const sir_epidemic_params *params,
+    double x[3], double h)
+{
+    sir_epidemic_solver s;
+    sir_epidemic_status status = sir_epidemic_init(&s, params, x);
+    if (status != sir_epidemic_OK) return status;
+    for (int i = 0; i < 3; ++i) s.carry[i] = group->carry[i][lane];
+    status = sir_epidemic_integrate(&s, h, group->left[lane]);
+    memcpy(x, s.x, sizeof s.x);
+    return status;
+}
+
+/* The members from first on, as many as there are lanes. The first status that is not OK. */
+static sir_epidemic_status sir_epidemic_group_run(const sir_epidemic_params *params, double *x, size_t members, size_t first,
+    double h, size_t steps, unsigned char *status)
+{
+    sir_epidemic_group group;
+    sir_epidemic_status worst = sir_epidemic_OK, member[8];
+    const int count = members - first < sir_epidemic_LANES ? (int)(members - first) : sir_epidemic_LANES;
+    double state[3];
+    memset(&group, 0, sizeof group);
+    for (int lane = 0; lane < count; ++lane) {
+        for (size_t i = 0; i < 3; ++i) state[i] = x[i * members + first + (size_t)lane];
+        group.left[lane] = steps;
+        member[lane] = sir_epidemic_group_join(&group, lane, params, state, h);
+    }
+    for (size_t k = 0; k < steps && sir_epidemic_group_step(&group, steps - k) > 2; ++k) continue;
+    for (int lane = 0; lane < count; ++lane) {
+        for (int i = 0; i < 3; ++i) state[i] = group.x[i][lane];
+        if (member[lane] == sir_epidemic_OK) {
+            if (group.left[lane] > 0) member[lane] = sir_epidemic_group_finish(&group, lane, params, state, h);
+            for (size_t i = 0; i < 3; ++i) x[i * members + first + (size_t)lane] = state[i];
+        }
+        if (status != NULL) status[first + (size_t)lane] = (unsigned char)member[lane];
+        if (worst == sir_epidemic_OK) worst = member[lane];
+    }
+    return worst;
 }
 
 sir_epidemic_status sir_epidemic_ensemble(const sir_epidemic_params *params, double *x, size_t members,
                                           double h, size_t steps, unsigned char *status)
 {
     sir_epidemic_status worst = sir_epidemic_OK;
+    size_t earliest = members;
     if (x == NULL && members > 0) return sir_epidemic_BAD_ARGUMENT;
-    for (size_t m = 0; m < members; ++m) {
-        sir_epidemic_solver s;
-        double x0[3];
-        for (size_t i = 0; i < 3; ++i) x0[i] = x[i * members + m];
-        sir_epidemic_status member = sir_epidemic_init(&s, params, x0);
-        if (member == sir_epidemic_OK) {
-            member = sir_epidemic_integrate(&s, h, steps);
-            for (size_t i = 0; i < 3; ++i) x[i * members + m] = s.x[i];
+#ifdef _OPENMP
+#pragma omp parallel for schedule(dynamic)
+#endif
+    for (size_t first = 0; first < members; first += sir_epidemic_LANES) {
+        const sir_epidemic_status group = sir_epidemic_group_run(params, x, members, first, h, steps, status);
+        if (group == sir_epidemic_OK) continue;
+#ifdef _OPENMP
+#pragma omp critical
+#endif
+        if (first < earliest) {
+            earliest = first;
+            worst = group;
         }
-        if (status != NULL) status[m] = (unsigned char)member;
-        if (worst == sir_epidemic_OK) worst = member;
     }
     return worst;
 }
+
+#if defined(__clang__)
+#pragma clang diagnostic pop
+#endif
 
 /* the Hamiltonian */
 static void sir_epidemic_energy(const sir_epidemic_params *params, const double x[3],

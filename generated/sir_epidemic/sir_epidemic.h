@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 9304d9b9bb906157e406153a22a0a461e4954956d43b4e033f20ff90842ff03d
+ * body-sha256: 3a298682a0f4b2d8da6370d0e0b4873e2e9ac581cde0a8bcd3fffa9dcdd8abab
  */
 #ifndef SIR_EPIDEMIC_H
 #define SIR_EPIDEMIC_H
@@ -47,7 +47,7 @@ typedef enum {
 } sir_epidemic_status;
 
 /* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
-   fitted to the last 96 values. They affect speed only. */
+   fitted to the last 95 values. They affect speed only. */
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
@@ -56,8 +56,8 @@ typedef struct {
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */
     int patience; /* how many of those before the recurrence is fitted again */
-    double past[192][sir_epidemic_DIM]; /* values, the latest last */
-    double weight[32][sir_epidemic_DIM][1]; /* of past values, the latest first, for the next value */
+    double past[190][sir_epidemic_DIM]; /* values, the latest last */
+    double weight[32][sir_epidemic_DIM][8]; /* of past values, the latest first, for the next values */
 } sir_epidemic_memory;
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with sir_epidemic_init. */
@@ -69,6 +69,13 @@ typedef struct {
     sir_epidemic_params params;
     double h;  /* the step size that coef belongs to */
     int ready; /* whether coef has been computed */
+    double effort;  /* evaluations that a single step takes, for each stage */
+    int pause;      /* steps to make singly before a block is tried */
+    int setback;    /* the last pause, halved with every block that succeeds */
+    int foreseeing; /* whether blocks are guessed by recurrences */
+    int passes;     /* that the last block took which was guessed by Runge-Kutta steps */
+    size_t doubt;   /* steps to wait before recurrences are tried again */
+    size_t retry;   /* steps after which that is */
     double coef[1][4]; /* what depends on params and h only, for each stage */
     sir_epidemic_memory memory[1];
 } sir_epidemic_solver;
@@ -83,7 +90,8 @@ sir_epidemic_status sir_epidemic_step(sir_epidemic_solver *s, double h);
 /* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 sir_epidemic_status sir_epidemic_integrate(sir_epidemic_solver *s, double h, size_t steps);
 
-/* Many members, in place: x[i * members + m] is coordinate i of member m. Each is integrated by itself.
+/* Many members, in place: x[i * members + m] is coordinate i of member m. 8 are integrated
+   side by side, and with OpenMP such groups in parallel.
    status (or NULL) receives the status of each member; a failed member keeps its last good state.
    Returns the first status that is not OK. */
 sir_epidemic_status sir_epidemic_ensemble(const sir_epidemic_params *params, double *x, size_t members,

@@ -12,7 +12,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 0ed6acbc42dd342ca2b54cac5e826dbb6d5a7b4509b538baa7cb90da5f263fcd
+ * body-sha256: 79f82fd6e75bc313947eddba2020ee646e03ffd2d9272bf7dbac889ef7ed736d
  */
 #ifndef SIR_FINAL_SIZE_H
 #define SIR_FINAL_SIZE_H
@@ -46,7 +46,7 @@ typedef enum {
 } sir_final_size_status;
 
 /* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
-   fitted to the last 96 values. They affect speed only. */
+   fitted to the last 95 values. They affect speed only. */
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
@@ -55,8 +55,8 @@ typedef struct {
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */
     int patience; /* how many of those before the recurrence is fitted again */
-    double past[192][sir_final_size_DIM]; /* values, the latest last */
-    double weight[32][sir_final_size_DIM][1]; /* of past values, the latest first, for the next value */
+    double past[190][sir_final_size_DIM]; /* values, the latest last */
+    double weight[32][sir_final_size_DIM][8]; /* of past values, the latest first, for the next values */
 } sir_final_size_memory;
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with sir_final_size_init. */
@@ -68,6 +68,13 @@ typedef struct {
     sir_final_size_params params;
     double h;  /* the step size that coef belongs to */
     int ready; /* whether coef has been computed */
+    double effort;  /* evaluations that a single step takes, for each stage */
+    int pause;      /* steps to make singly before a block is tried */
+    int setback;    /* the last pause, halved with every block that succeeds */
+    int foreseeing; /* whether blocks are guessed by recurrences */
+    int passes;     /* that the last block took which was guessed by Runge-Kutta steps */
+    size_t doubt;   /* steps to wait before recurrences are tried again */
+    size_t retry;   /* steps after which that is */
     double coef[1][3]; /* what depends on params and h only, for each stage */
     sir_final_size_memory memory[1];
 } sir_final_size_solver;
@@ -82,7 +89,8 @@ sir_final_size_status sir_final_size_step(sir_final_size_solver *s, double h);
 /* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 sir_final_size_status sir_final_size_integrate(sir_final_size_solver *s, double h, size_t steps);
 
-/* Many members, in place: x[i * members + m] is coordinate i of member m. Each is integrated by itself.
+/* Many members, in place: x[i * members + m] is coordinate i of member m. 8 are integrated
+   side by side, and with OpenMP such groups in parallel.
    status (or NULL) receives the status of each member; a failed member keeps its last good state.
    Returns the first status that is not OK. */
 sir_final_size_status sir_final_size_ensemble(const sir_final_size_params *params, double *x, size_t members,

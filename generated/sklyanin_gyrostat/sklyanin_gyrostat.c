@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: bd99cfb15337e8584e06d32ce8fe33ae0c46dab054ffafb0c90123ff4fcfe4ed
+ * body-sha256: e289f8af2874e341ed8639b38a56b1777f962e87b2a8a77474d3b2b2f981adaf
  */
 #include "sklyanin_gyrostat.h"
 
@@ -28,6 +28,13 @@ const sklyanin_gyrostat_params sklyanin_gyrostat_default_params = { 0 };
 
 /* A step of size h is the composition of these fractions of it. */
 static const double sklyanin_gyrostat_fractions[1] = { 1.0 };
+
+/* Functions to be kept apart: very long ones compile in quadratic time. */
+#if defined(__GNUC__)
+#define sklyanin_gyrostat_APART __attribute__((noinline))
+#else
+#define sklyanin_gyrostat_APART
+#endif
 
 /* everything that depends on parameters and step size only */
 static void sklyanin_gyrostat_prepare(const sklyanin_gyrostat_params *params, const double gauge[1], double h,
@@ -235,7 +242,7 @@ static int sklyanin_gyrostat_near(const double guess[4], const double last[4])
     return distance <= 4.0 * size;
 }
 
-/* The guess for the next value (p), from earlier ones; 0 if there is none. */
+/* The guess for the next value (y), from earlier ones; 0 if there is none. */
 static int sklyanin_gyrostat_predict(const sklyanin_gyrostat_memory *memory, double value[4])
 {
     const int last = memory->count - 1;
@@ -305,20 +312,20 @@ static void sklyanin_gyrostat_project(int rows, double (*one)[8], int column, do
     }
 }
 
-/* Fit the recurrences value[m + l] = sum of weight[k][..][l] * value[m - 1 - k], l = 0 ... 1 - 1, to the history of
+/* Fit the recurrences value[m + l] = sum of weight[k][..][l] * value[m - 1 - k], l = 0 ... 8 - 1, to the history of
    a component: ridge least squares by modified Gram-Schmidt, the ridge at the level of rounding. Columns are taken in by
    eights, until they leave next to nothing of the right-hand sides. How many past values are used. */
 static int sklyanin_gyrostat_train(sklyanin_gyrostat_memory *memory, int component)
 {
-    enum { AHEAD = 1, WINDOW = 32, ROWS = 64 };
+    enum { AHEAD = 8, WINDOW = 32, ROWS = 56 };
     double q[WINDOW / 8][ROWS + WINDOW][8], r[WINDOW / 8][WINDOW][8], inverse[WINDOW]; /* eight columns in each part */
-    double right[ROWS + WINDOW][8], weight[WINDOW][8], value[96], largest = 0.0, left = HUGE_VAL;
+    double right[ROWS + WINDOW][8], weight[WINDOW][8], value[95], largest = 0.0, left = HUGE_VAL;
     int terms = 0;
     memset(q, 0, sizeof q);
     memset(right, 0, sizeof right);
     memset(weight, 0, sizeof weight);
-    for (int i = 0; i < 96; ++i) {
-        value[i] = memory->past[memory->count - 96 + i][component];
+    for (int i = 0; i < 95; ++i) {
+        value[i] = memory->past[memory->count - 95 + i][component];
         if (fabs(value[i]) > largest) largest = fabs(value[i]);
     }
     for (int i = 0; i < ROWS; ++i)
@@ -349,9 +356,9 @@ static int sklyanin_gyrostat_train(sklyanin_gyrostat_memory *memory, int compone
 /* Drop what is old, if so many values would not fit into the history. */
 static void sklyanin_gyrostat_make_room(sklyanin_gyrostat_memory *memory, int values)
 {
-    if (memory->count + values <= 192) return;
-    memmove(memory->past, memory->past + memory->count - 96, 96 * sizeof memory->past[0]);
-    memory->count = 96;
+    if (memory->count + values <= 190) return;
+    memmove(memory->past, memory->past + memory->count - 95, 95 * sizeof memory->past[0]);
+    memory->count = 95;
 }
 
 /* Add a value to the history. */
@@ -381,7 +388,7 @@ static void sklyanin_gyrostat_remember(sklyanin_gyrostat_memory *memory, const d
     if (iterations > 1) sklyanin_gyrostat_judge(memory, value);
     sklyanin_gyrostat_record(memory, value);
     memory->slow = iterations > 1 ? memory->slow + 1 : 0;
-    if (memory->slow > memory->patience && memory->count >= 96) sklyanin_gyrostat_fit(memory);
+    if (memory->slow > memory->patience && memory->count >= 95) sklyanin_gyrostat_fit(memory);
 }
 
 /* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last
@@ -404,7 +411,7 @@ static int sklyanin_gyrostat_advance(sklyanin_gyrostat_solver *s, const double c
 }
 
 /* Coefficient k of the product of two Taylor series. */
-static double sklyanin_gyrostat_product(const double *a, const double *b, int k)
+static double sklyanin_gyrostat_taylor_product(const double *a, const double *b, int k)
 {
     double sum = 0.0;
     for (int j = 0; j <= k; ++j) sum += a[j] * b[k - j];
@@ -515,27 +522,27 @@ static int sklyanin_gyrostat_piece(const double *coef, const double p[4], const 
     s[39][0] = s[36][0] - s[38][0];
     for (int k = 0; k < 30; ++k) {
         if (k > 0) {
-            s[4][k] = sklyanin_gyrostat_product(s[1], s[3], k);
+            s[4][k] = sklyanin_gyrostat_taylor_product(s[1], s[3], k);
             s[5][k] = p[2] * s[4][k];
             s[6][k] = 3.0 * s[5][k];
-            s[7][k] = sklyanin_gyrostat_product(s[2], s[3], k);
+            s[7][k] = sklyanin_gyrostat_taylor_product(s[2], s[3], k);
             s[8][k] = p[1] * s[7][k];
             s[9][k] = 2.0 * s[8][k];
             s[10][k] = s[6][k] - s[9][k];
-            s[11][k] = sklyanin_gyrostat_product(s[1], s[2], k);
+            s[11][k] = sklyanin_gyrostat_taylor_product(s[1], s[2], k);
             s[12][k] = p[3] * s[11][k];
             s[13][k] = s[10][k] - s[12][k];
             s[14][k] = p[0] * s[7][k];
             s[15][k] = 2.0 * s[14][k];
-            s[16][k] = sklyanin_gyrostat_product(s[0], s[3], k);
+            s[16][k] = sklyanin_gyrostat_taylor_product(s[0], s[3], k);
             s[17][k] = p[2] * s[16][k];
             s[18][k] = 2.0 * s[17][k];
             s[19][k] = s[15][k] + s[18][k];
-            s[20][k] = sklyanin_gyrostat_product(s[0], s[2], k);
+            s[20][k] = sklyanin_gyrostat_taylor_product(s[0], s[2], k);
             s[21][k] = p[3] * s[20][k];
             s[22][k] = 2.0 * s[21][k];
             s[23][k] = s[19][k] - s[22][k];
-            s[24][k] = sklyanin_gyrostat_product(s[0], s[1], k);
+            s[24][k] = sklyanin_gyrostat_taylor_product(s[0], s[1], k);
             s[25][k] = p[3] * s[24][k];
             s[26][k] = 2.0 * s[25][k];
             s[27][k] = p[0] * s[4][k];
@@ -596,12 +603,12 @@ static int sklyanin_gyrostat_path(const double *coef, const double x[4], const d
     return 0;
 }
 
-/* The residual p - grad S_h(mean of the path) of the equation for p, with the path's change of x and an
-   approximate Jacobian of the residual. 0 if the path cannot be followed. */
-static int sklyanin_gyrostat_residual(sklyanin_gyrostat_solver *s, const double *coef, const double p[4], double residual[4],
-    double change[4], double jacobian[16])
+/* The residual p - grad S_h(mean of the path) of the equation for p, with that mean y, the path's change of
+   x and an approximate Jacobian of the residual. 0 if the path cannot be followed. */
+static int sklyanin_gyrostat_residual(sklyanin_gyrostat_solver *s, const double *coef, const double p[4], double y[4],
+    double residual[4], double change[4], double jacobian[16])
 {
-    double y[4], mean[4];
+    double mean[4];
     if (!sklyanin_gyrostat_path(coef, s->x, p, change, mean)) return 0;
     for (int i = 0; i < 4; ++i) y[i] = s->x[i] + mean[i];
     sklyanin_gyrostat_generate(coef, y, residual, jacobian);
@@ -614,12 +621,12 @@ static int sklyanin_gyrostat_residual(sklyanin_gyrostat_solver *s, const double 
 static int sklyanin_gyrostat_differences(sklyanin_gyrostat_solver *s, const double *coef, const double p[4],
     const double residual[4], double jacobian[16])
 {
-    double q[4], moved[4], change[4], unused[16], norm = DBL_MIN;
+    double q[4], y[4], moved[4], change[4], unused[16], norm = DBL_MIN;
     for (int i = 0; i < 4; ++i) norm = fabs(p[i]) > norm ? fabs(p[i]) : norm;
     for (int j = 0; j < 4; ++j) {
         memcpy(q, p, sizeof q);
         q[j] += 1e-7 * norm;
-        if (!sklyanin_gyrostat_residual(s, coef, q, moved, change, unused)) return 0;
+        if (!sklyanin_gyrostat_residual(s, coef, q, y, moved, change, unused)) return 0;
         for (int i = 0; i < 4; ++i) jacobian[i * 4 + j] = (moved[i] - residual[i]) / (q[j] - p[j]);
     }
     return 1;
@@ -630,10 +637,11 @@ static sklyanin_gyrostat_status sklyanin_gyrostat_attempt(sklyanin_gyrostat_solv
 {
     const double *coef = s->coef[stage], none[4] = { 0.0 };
     sklyanin_gyrostat_memory *memory = &s->memory[stage];
-    double p[4], residual[4], change[4], jacobian[16], previous = HUGE_VAL;
-    sklyanin_gyrostat_predict(memory, p);
+    double p[4], y[4], residual[4], change[4], jacobian[16], previous = HUGE_VAL;
+    if (!sklyanin_gyrostat_predict(memory, y)) memcpy(y, s->x, sizeof y);
+    sklyanin_gyrostat_generate(coef, y, p, jacobian);
     for (int iteration = 0; iteration < 20; ++iteration) {
-        if (!sklyanin_gyrostat_residual(s, coef, p, residual, change, jacobian)) return sklyanin_gyrostat_NO_CONVERGENCE;
+        if (!sklyanin_gyrostat_residual(s, coef, p, y, residual, change, jacobian)) return sklyanin_gyrostat_NO_CONVERGENCE;
         double size = 0.0, norm = DBL_MIN;
         for (int i = 0; i < 4; ++i) {
             if (!isfinite(residual[i])) return sklyanin_gyrostat_NOT_FINITE;
@@ -644,7 +652,7 @@ static sklyanin_gyrostat_status sklyanin_gyrostat_attempt(sklyanin_gyrostat_solv
         /* The second test: residuals no longer shrink, the solve has reached the level of rounding. */
         if (size <= 4e-16 || (previous < 1e-12 && size > 0.25 * previous)) {
             if (!sklyanin_gyrostat_advance(s, change, none)) return sklyanin_gyrostat_NOT_FINITE;
-            sklyanin_gyrostat_remember(memory, p, iteration);
+            sklyanin_gyrostat_remember(memory, y, iteration);
             return sklyanin_gyrostat_OK;
         }
         if (iteration >= 3 && size > 0.2 * previous && !sklyanin_gyrostat_differences(s, coef, p, residual, jacobian))
@@ -873,6 +881,11 @@ static sklyanin_gyrostat_status sklyanin_gyrostat_set_step(sklyanin_gyrostat_sol
         sklyanin_gyrostat_prepare(&s->params, s->gauge, sklyanin_gyrostat_fractions[stage] * h, s->coef[stage]);
     memset(s->memory, 0, sizeof s->memory);
     for (int stage = 0; stage < 1; ++stage) s->memory[stage].patience = 150;
+    s->pause = 16;
+    s->setback = s->foreseeing = 0;
+    s->doubt = s->retry = 0;
+    s->effort = 0.0;
+    s->passes = INT_MAX;
     s->h = h;
     s->ready = 1;
     return sklyanin_gyrostat_OK;
@@ -887,13 +900,1754 @@ sklyanin_gyrostat_status sklyanin_gyrostat_step(sklyanin_gyrostat_solver *s, dou
     return status;
 }
 
+/*
+ * Eight at a time: below, the formulas of a step are evaluated for 8 steps of a trajectory, or members of an
+ * ensemble, at once. Compilers make vector instructions of the loops over lanes.
+ */
+enum { sklyanin_gyrostat_LANES = 8 };
+
+#if defined(__GNUC__)
+typedef double sklyanin_gyrostat_lanes[sklyanin_gyrostat_LANES] __attribute__((aligned(64))); /* a value in each lane */
+#else
+typedef double sklyanin_gyrostat_lanes[sklyanin_gyrostat_LANES];
+#endif
+
+#if defined(__clang__)
+#define sklyanin_gyrostat_EACH_LANE _Pragma("clang loop vectorize(assume_safety)")
+#pragma clang diagnostic push
+#pragma clang diagnostic ignored "-Wpass-failed"
+#elif defined(__GNUC__)
+#define sklyanin_gyrostat_EACH_LANE _Pragma("GCC ivdep") _Pragma("GCC unroll 1")
+#else
+#define sklyanin_gyrostat_EACH_LANE
+#endif
+
+/* What all blocks share: coefficients, the same in each lane, and the recurrences by which they are foreseen. */
+typedef struct {
+    int fits[1]; /* the fit that weight is of; -1 for none */
+    sklyanin_gyrostat_lanes coef[1][31], weight[1][32][4];
+} sklyanin_gyrostat_table;
+
+/* A stage in all lanes, linearised around y: a residual r of alpha(y) = x takes inverse r from y and gain r from the
+   increment. */
+typedef struct {
+    sklyanin_gyrostat_lanes y[4], displacement[4], increment[4], residual[4];
+    sklyanin_gyrostat_lanes inverse[16], slope[16], gain[16];
+    sklyanin_gyrostat_lanes at[4], middle[4]; /* y when it was last evaluated, the middle of the path less y */
+    sklyanin_gyrostat_lanes sway[16]; /* the derivative of middle along y */
+    sklyanin_gyrostat_lanes alpha_y[16], increment_y[16]; /* of alpha and beta - alpha, with p held fixed */
+} sklyanin_gyrostat_model;
+
+/* sklyanin_gyrostat_curvature in all lanes. */
+static void sklyanin_gyrostat_curvature_lanes(sklyanin_gyrostat_lanes coef[restrict 31],
+                                              sklyanin_gyrostat_lanes y[restrict 4],
+                                              sklyanin_gyrostat_lanes slope[restrict 4],
+                                              sklyanin_gyrostat_lanes slope_jacobian[restrict 16])
+{
+    sklyanin_gyrostat_EACH_LANE
+    for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) {
+        const double S0 = y[0][lane];
+        const double S1 = y[1][lane];
+        const double S2 = y[2][lane];
+        const double S3 = y[3][lane];
+        const double t1 = S3 * S3;
+        const double t2 = S2 * coef[6][lane];
+        const double t3 = coef[4][lane] * t1 + S2 * (coef[5][lane] + t2);
+        const double t4 = S2 * coef[10][lane];
+        const double t5 = S2 * (coef[9][lane] + t4) + (coef[7][lane] + coef[8][lane] * t1);
+        const double t6 = S1 * t5;
+        const double t7 = coef[1][lane] * t1;
+        const double t8 = coef[2][lane] + coef[3][lane] * t1;
+        const double t9 = S2 * t8;
+        const double t10 = S1 * (t3 + t6) + (coef[0][lane] * t1 + S2 * (t7 + t9));
+        const double t11 = S0 * S0;
+        const double t12 = coef[14][lane] + t2;
+        const double t13 = coef[20][lane] + t11 * (S1 * (coef[4][lane] + S1 * coef[8][lane]) + (coef[0][lane] + S2 * (coef[1][lane] + S2 * coef[3][lane])));
+        const double t14 = S2 * coef[24][lane];
+        const double t15 = S0 * (t3 + S1 * (coef[21][lane] + coef[22][lane] * t1 + S2 * (coef[23][lane] + t14)));
+        const double t16 = S1 * (coef[9][lane] + t14);
+        const double t17 = S0 * (t7 + S2 * (coef[25][lane] + coef[26][lane] * t1) + S1 * (coef[5][lane] + S2 * coef[27][lane] + t16));
+        const double t18 = S1 * coef[22][lane];
+        const double t19 = S2 * coef[26][lane];
+        const double t20 = S0 * S3 * (S1 * (coef[30][lane] + t18) + (coef[28][lane] + S2 * (coef[29][lane] + t19)));
+        const double t21 = t11 * (t12 + t16);
+        const double t22 = S3 * t11;
+        const double t23 = (coef[4][lane] + t18) * t22;
+        const double t24 = t22 * (coef[1][lane] + t19);
+        slope[0][lane] = S0 * t10;
+        slope[1][lane] = coef[11][lane] + S1 * coef[12][lane] + t11 * (coef[13][lane] * t1 + S2 * (coef[14][lane] + S2 * coef[15][lane]) + t6);
+        slope[2][lane] = coef[16][lane] + S2 * coef[17][lane] + t11 * (S1 * (t12 + S1 * (coef[19][lane] + t4)) + (coef[18][lane] * t1 + t9));
+        slope[3][lane] = S3 * t13;
+        slope_jacobian[0][lane] = t10;
+        slope_jacobian[1][lane] = t15;
+        slope_jacobian[2][lane] = t17;
+        slope_jacobian[3][lane] = t20;
+        slope_jacobian[4][lane] = t15;
+        slope_jacobian[5][lane] = coef[12][lane] + t11 * t5;
+        slope_jacobian[6][lane] = t21;
+        slope_jacobian[7][lane] = t23;
+        slope_jacobian[8][lane] = t17;
+        slope_jacobian[9][lane] = t21;
+        slope_jacobian[10][lane] = coef[17][lane] + t11 * (t8 + S1 * (coef[6][lane] + S1 * coef[10][lane]));
+        slope_jacobian[11][lane] = t24;
+        slope_jacobian[12][lane] = t20;
+        slope_jacobian[13][lane] = t23;
+        slope_jacobian[14][lane] = t24;
+        slope_jacobian[15][lane] = t13;
+    }
+}
+
+/* sklyanin_gyrostat_momentum in all lanes. */
+static void sklyanin_gyrostat_momentum_lanes(sklyanin_gyrostat_lanes coef[restrict 31],
+                                             sklyanin_gyrostat_lanes y[restrict 4],
+                                             sklyanin_gyrostat_lanes slope[restrict 4])
+{
+    sklyanin_gyrostat_EACH_LANE
+    for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) {
+        const double S0 = y[0][lane];
+        const double S1 = y[1][lane];
+        const double S2 = y[2][lane];
+        const double S3 = y[3][lane];
+        const double t1 = S3 * S3;
+        const double t2 = S2 * coef[6][lane];
+        const double t3 = S2 * coef[10][lane];
+        const double t4 = S1 * (S2 * (coef[9][lane] + t3) + (coef[7][lane] + coef[8][lane] * t1));
+        const double t5 = S2 * (coef[2][lane] + coef[3][lane] * t1);
+        const double t6 = S0 * S0;
+        slope[0][lane] = S0 * (S1 * (coef[4][lane] * t1 + S2 * (coef[5][lane] + t2) + t4) + (coef[0][lane] * t1 + S2 * (coef[1][lane] * t1 + t5)));
+        slope[1][lane] = coef[11][lane] + S1 * coef[12][lane] + t6 * (coef[13][lane] * t1 + S2 * (coef[14][lane] + S2 * coef[15][lane]) + t4);
+        slope[2][lane] = coef[16][lane] + S2 * coef[17][lane] + t6 * (S1 * (coef[14][lane] + t2 + S1 * (coef[19][lane] + t3)) + (coef[18][lane] * t1 + t5));
+        slope[3][lane] = S3 * (coef[20][lane] + t6 * (S1 * (coef[4][lane] + S1 * coef[8][lane]) + (coef[0][lane] + S2 * (coef[1][lane] + S2 * coef[3][lane]))));
+    }
+}
+
+/* sklyanin_gyrostat_values in all lanes. */
+static void sklyanin_gyrostat_values_lanes(sklyanin_gyrostat_lanes coef[restrict 31],
+                                           sklyanin_gyrostat_lanes p[restrict 4],
+                                           sklyanin_gyrostat_lanes m[restrict 4],
+                                           sklyanin_gyrostat_lanes value[restrict 40],
+                                           sklyanin_gyrostat_lanes fixed[restrict 1])
+{
+    (void)coef;
+    (void)fixed;
+    sklyanin_gyrostat_EACH_LANE
+    for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) {
+        const double S0 = m[0][lane];
+        const double S1 = m[1][lane];
+        const double S2 = m[2][lane];
+        const double S3 = m[3][lane];
+        const double t1 = S1 * S3;
+        const double t2 = p[2][lane] * t1;
+        const double t3 = 3.0 * t2;
+        const double t4 = S2 * S3;
+        const double t5 = p[1][lane] * t4;
+        const double t6 = 2.0 * t5;
+        const double t7 = t3 - t6;
+        const double t8 = S1 * S2;
+        const double t9 = p[3][lane] * t8;
+        const double t10 = p[0][lane] * t4;
+        const double t11 = 2.0 * t10;
+        const double t12 = S0 * S3;
+        const double t13 = p[2][lane] * t12;
+        const double t14 = 2.0 * t13;
+        const double t15 = t11 + t14;
+        const double t16 = S0 * S2;
+        const double t17 = p[3][lane] * t16;
+        const double t18 = 2.0 * t17;
+        const double t19 = S0 * S1;
+        const double t20 = p[3][lane] * t19;
+        const double t21 = 2.0 * t20;
+        const double t22 = p[0][lane] * t1;
+        const double t23 = (-3.0) * t22;
+        const double t24 = p[1][lane] * t12;
+        const double t25 = 2.0 * t24;
+        const double t26 = t23 - t25;
+        const double t27 = p[0][lane] * t8;
+        const double t28 = p[1][lane] * t16;
+        const double t29 = 2.0 * t28;
+        const double t30 = t27 + t29;
+        const double t31 = p[2][lane] * t19;
+        const double t32 = 2.0 * t31;
+        value[0][lane] = S0;
+        value[1][lane] = S1;
+        value[2][lane] = S2;
+        value[3][lane] = S3;
+        value[4][lane] = t1;
+        value[5][lane] = t2;
+        value[6][lane] = t3;
+        value[7][lane] = t4;
+        value[8][lane] = t5;
+        value[9][lane] = t6;
+        value[10][lane] = t7;
+        value[11][lane] = t8;
+        value[12][lane] = t9;
+        value[13][lane] = t7 - t9;
+        value[14][lane] = t10;
+        value[15][lane] = t11;
+        value[16][lane] = t12;
+        value[17][lane] = t13;
+        value[18][lane] = t14;
+        value[19][lane] = t15;
+        value[20][lane] = t16;
+        value[21][lane] = t17;
+        value[22][lane] = t18;
+        value[23][lane] = t15 - t18;
+        value[24][lane] = t19;
+        value[25][lane] = t20;
+        value[26][lane] = t21;
+        value[27][lane] = t22;
+        value[28][lane] = t23;
+        value[29][lane] = t24;
+        value[30][lane] = t25;
+        value[31][lane] = t26;
+        value[32][lane] = t21 + t26;
+        value[33][lane] = t27;
+        value[34][lane] = t28;
+        value[35][lane] = t29;
+        value[36][lane] = t30;
+        value[37][lane] = t31;
+        value[38][lane] = t32;
+        value[39][lane] = t30 - t32;
+    }
+}
+
+/* sklyanin_gyrostat_slope_values in all lanes. */
+static void sklyanin_gyrostat_slope_values_lanes(sklyanin_gyrostat_lanes coef[restrict 31],
+                                                 sklyanin_gyrostat_lanes p[restrict 4],
+                                                 sklyanin_gyrostat_lanes value[restrict 40],
+                                                 sklyanin_gyrostat_lanes fixed[restrict 1],
+                                                 sklyanin_gyrostat_lanes slope[restrict 51],
+                                                 sklyanin_gyrostat_lanes slope_fixed[restrict 1])
+{
+    (void)coef;
+    (void)fixed;
+    (void)slope_fixed;
+    sklyanin_gyrostat_EACH_LANE
+    for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) {
+        const double t1 = p[2][lane] * value[3][lane];
+        const double t2 = 3.0 * t1;
+        const double t3 = p[3][lane] * value[2][lane];
+        const double t4 = p[1][lane] * value[3][lane];
+        const double t5 = (-2.0) * t4;
+        const double t6 = p[3][lane] * value[1][lane];
+        const double t7 = p[2][lane] * value[1][lane];
+        const double t8 = 3.0 * t7;
+        const double t9 = p[1][lane] * value[2][lane];
+        const double t10 = 2.0 * t9;
+        const double t11 = 2.0 * t1;
+        const double t12 = 2.0 * t3;
+        const double t13 = p[0][lane] * value[3][lane];
+        const double t14 = 2.0 * t13;
+        const double t15 = p[3][lane] * value[0][lane];
+        const double t16 = 2.0 * t15;
+        const double t17 = p[2][lane] * value[0][lane];
+        const double t18 = 2.0 * t17;
+        const double t19 = p[0][lane] * value[2][lane];
+        const double t20 = 2.0 * t19;
+        const double t21 = 2.0 * t6;
+        const double t22 = 2.0 * t4;
+        const double t23 = 3.0 * t13;
+        const double t24 = p[0][lane] * value[1][lane];
+        const double t25 = (-3.0) * t24;
+        const double t26 = p[1][lane] * value[0][lane];
+        const double t27 = 2.0 * t26;
+        const double t28 = 2.0 * t7;
+        slope[0][lane] = t1;
+        slope[1][lane] = t2;
+        slope[2][lane] = t3;
+        slope[3][lane] = t2 - t3;
+        slope[4][lane] = t4;
+        slope[5][lane] = t5;
+        slope[6][lane] = t6;
+        slope[7][lane] = t5 - t6;
+        slope[8][lane] = t7;
+        slope[9][lane] = t8;
+        slope[10][lane] = t9;
+        slope[11][lane] = t10;
+        slope[12][lane] = t8 - t10;
+        slope[13][lane] = t11;
+        slope[14][lane] = t12;
+        slope[15][lane] = t11 - t12;
+        slope[16][lane] = t13;
+        slope[17][lane] = t14;
+        slope[18][lane] = t15;
+        slope[19][lane] = t16;
+        slope[20][lane] = t14 - t16;
+        slope[21][lane] = t17;
+        slope[22][lane] = t18;
+        slope[23][lane] = t19;
+        slope[24][lane] = t20;
+        slope[25][lane] = t18 + t20;
+        slope[26][lane] = t21;
+        slope[27][lane] = t22;
+        slope[28][lane] = t21 - t22;
+        slope[29][lane] = t23;
+        slope[30][lane] = t16 - t23;
+        slope[31][lane] = t24;
+        slope[32][lane] = t25;
+        slope[33][lane] = t26;
+        slope[34][lane] = t27;
+        slope[35][lane] = t25 - t27;
+        slope[36][lane] = t28;
+        slope[37][lane] = t10 - t28;
+        slope[38][lane] = t19 - t18;
+        slope[39][lane] = t24 + t27;
+        slope[40][lane] = (-2.0) * value[7][lane];
+        slope[41][lane] = 3.0 * value[4][lane];
+        slope[42][lane] = -value[11][lane];
+        slope[43][lane] = 2.0 * value[7][lane];
+        slope[44][lane] = 2.0 * value[16][lane];
+        slope[45][lane] = (-2.0) * value[20][lane];
+        slope[46][lane] = (-3.0) * value[4][lane];
+        slope[47][lane] = (-2.0) * value[16][lane];
+        slope[48][lane] = 2.0 * value[24][lane];
+        slope[49][lane] = 2.0 * value[20][lane];
+        slope[50][lane] = (-2.0) * value[24][lane];
+    }
+}
+
+/* sklyanin_gyrostat_along_mean_lanes_part1 (part 1 of 2) */
+sklyanin_gyrostat_APART static void sklyanin_gyrostat_along_mean_lanes_part1(
+                                                                             sklyanin_gyrostat_lanes even[restrict 32],
+                                                                             sklyanin_gyrostat_lanes odd[restrict 32],
+                                                                             sklyanin_gyrostat_lanes mean[restrict 32],
+                                                                             sklyanin_gyrostat_lanes hessian[restrict 16],
+                                                                             sklyanin_gyrostat_lanes alpha_y[restrict 16],
+                                                                             sklyanin_gyrostat_lanes increment_y[restrict 16],
+                                                                             sklyanin_gyrostat_lanes jacobian[restrict 16],
+                                                                             sklyanin_gyrostat_lanes increment_jacobian[restrict 16],
+                                                                             sklyanin_gyrostat_lanes sway[restrict 16],
+                                                                             sklyanin_gyrostat_lanes reciprocal[restrict 4],
+                                                                             sklyanin_gyrostat_lanes work[restrict 16])
+{
+    sklyanin_gyrostat_EACH_LANE
+    for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) {
+        const double t1 = even[0][lane] - odd[0][lane];
+        const double t2 = 1.0 / mean[0][lane];
+        const double t3 = mean[1][lane] * t2;
+        const double t4 = 1.0 / (mean[9][lane] - mean[8][lane] * t3);
+        const double t5 = mean[8][lane] * t2 * t4;
+        const double t6 = mean[2][lane] * t2;
+        const double t7 = (mean[10][lane] - mean[8][lane] * t6) * t4;
+        const double t8 = t6 - t3 * t7;
+        const double t9 = mean[17][lane] - mean[16][lane] * t3;
+        const double t10 = 1.0 / (mean[18][lane] - mean[16][lane] * t6 - t9 * t7);
+        const double t11 = (t9 * t5 - mean[16][lane] * t2) * t10;
+        const double t12 = mean[3][lane] * t2;
+        const double t13 = (mean[11][lane] - mean[8][lane] * t12) * t4;
+        const double t14 = (mean[19][lane] - mean[16][lane] * t12 - t9 * t13) * t10;
+        const double t15 = t12 - t3 * t13 - t8 * t14;
+        const double t16 = mean[25][lane] - mean[24][lane] * t3;
+        const double t17 = mean[26][lane] - mean[24][lane] * t6 - t16 * t7;
+        const double t18 = 1.0 / (mean[27][lane] - mean[24][lane] * t12 - t16 * t13 - t17 * t14);
+        const double t19 = (t16 * t5 - mean[24][lane] * t2 - t17 * t11) * t18;
+        const double t20 = t2 + t3 * t5 - t8 * t11 - t15 * t19;
+        const double t21 = even[1][lane] - odd[1][lane];
+        const double t22 = t13 - t7 * t14;
+        const double t23 = t5 + t7 * t11 + t22 * t19;
+        const double t24 = even[3][lane] - odd[3][lane];
+        const double t25 = even[2][lane] - odd[2][lane];
+        const double t26 = t11 - t14 * t19;
+        const double t27 = t9 * t4 * t10;
+        const double t28 = (t17 * t27 - t16 * t4) * t18;
+        const double t29 = t8 * t27 - t3 * t4 - t15 * t28;
+        const double t30 = t4 + t7 * t27 - t22 * t28;
+        const double t31 = t27 + t14 * t28;
+        const double t32 = t17 * t10 * t18;
+        const double t33 = t15 * t32 - t8 * t10;
+        const double t34 = t22 * t32 - t7 * t10;
+        const double t35 = t10 + t14 * t32;
+        const double t36 = t14 * t18;
+        const double t37 = t22 * t18;
+        const double t38 = t15 * t18;
+        const double t39 = even[11][lane] - odd[11][lane];
+        const double t40 = even[10][lane] - odd[10][lane];
+        const double t41 = even[8][lane] - odd[8][lane];
+        const double t42 = even[9][lane] - odd[9][lane];
+        const double t43 = even[19][lane] - odd[19][lane];
+        const double t44 = even[18][lane] - odd[18][lane];
+        const double t45 = even[16][lane] - odd[16][lane];
+        const double t46 = even[17][lane] - odd[17][lane];
+        const double t47 = even[24][lane] - odd[24][lane];
+        const double t48 = even[25][lane] - odd[25][lane];
+        const double t49 = even[27][lane] - odd[27][lane];
+        const double t50 = even[26][lane] - odd[26][lane];
+        const double t51 = even[6][lane] - odd[6][lane];
+        const double t52 = even[7][lane] - odd[7][lane];
+        const double t53 = even[4][lane] - odd[4][lane];
+        const double t54 = even[5][lane] - odd[5][lane];
+        const double t55 = hessian[12][lane] * mean[31][lane] + hessian[8][lane] * mean[30][lane] + (hessian[4][lane] * mean[29][lane] + hessian[0][lane] * mean[28][lane]);
+        const double t56 = hessian[12][lane] * mean[23][lane] + hessian[8][lane] * mean[22][lane] + (hessian[4][lane] * mean[21][lane] + hessian[0][lane] * mean[20][lane]);
+        const double t57 = hessian[8][lane] * mean[14][lane] + hessian[12][lane] * mean[15][lane] + (hessian[4][lane] * mean[13][lane] + hessian[0][lane] * mean[12][lane]);
+        const double t58 = 1.0 - (hessian[0][lane] * mean[4][lane] + hessian[4][lane] * mean[5][lane] + (hessian[8][lane] * mean[6][lane] + hessian[12][lane] * mean[7][lane]));
+        work[14][lane] = t55 * t37 - t56 * t34 - (t57 * t30 + t58 * t23);
+        work[15][lane] = t58 * t20 - t57 * t29 + (t55 * t38 - t56 * t33);
+        work[12][lane] = t56 * t32 - t55 * t18 + (t58 * t19 - t57 * t28);
+        work[13][lane] = t57 * t31 + t58 * t26 + (t55 * t36 - t56 * t35);
+        const double t63 = hessian[8][lane] * t51 + hessian[12][lane] * t52 + (hessian[0][lane] * t53 + hessian[4][lane] * t54) + (t21 * work[14][lane] + t1 * work[15][lane] + (t24 * work[12][lane] + t25 * work[13][lane]));
+        const double t64 = hessian[5][lane] * mean[21][lane] + hessian[1][lane] * mean[20][lane] + (hessian[9][lane] * mean[22][lane] + hessian[13][lane] * mean[23][lane]);
+        const double t65 = hessian[5][lane] * mean[29][lane] + hessian[1][lane] * mean[28][lane] + (hessian[13][lane] * mean[31][lane] + hessian[9][lane] * mean[30][lane]);
+        const double t66 = 1.0 - (hessian[1][lane] * mean[12][lane] + hessian[5][lane] * mean[13][lane] + (hessian[13][lane] * mean[15][lane] + hessian[9][lane] * mean[14][lane]));
+        const double t67 = hessian[13][lane] * mean[7][lane] + hessian[9][lane] * mean[6][lane] + (hessian[1][lane] * mean[4][lane] + hessian[5][lane] * mean[5][lane]);
+        work[0][lane] = t64 * t32 - t65 * t18 + (t66 * t28 - t67 * t19);
+        work[1][lane] = t65 * t36 - t64 * t35 - (t66 * t31 + t67 * t26);
+        work[2][lane] = t66 * t29 - t67 * t20 + (t65 * t38 - t64 * t33);
+        work[3][lane] = t65 * t37 - t64 * t34 + (t67 * t23 + t66 * t30);
+        const double t72 = hessian[13][lane] * t52 + hessian[9][lane] * t51 + (hessian[5][lane] * t54 + hessian[1][lane] * t53) + (t24 * work[0][lane] + t25 * work[1][lane] + (t1 * work[2][lane] + t21 * work[3][lane]));
+        const double t73 = hessian[2][lane] * mean[28][lane] + hessian[6][lane] * mean[29][lane] + (hessian[14][lane] * mean[31][lane] + hessian[10][lane] * mean[30][lane]);
+        const double t74 = 1.0 - (hessian[2][lane] * mean[20][lane] + hessian[6][lane] * mean[21][lane] + (hessian[10][lane] * mean[22][lane] + hessian[14][lane] * mean[23][lane]));
+        const double t75 = hessian[2][lane] * mean[4][lane] + hessian[6][lane] * mean[5][lane] + (hessian[14][lane] * mean[7][lane] + hessian[10][lane] * mean[6][lane]);
+        const double t76 = hessian[6][lane] * mean[13][lane] + hessian[2][lane] * mean[12][lane] + (hessian[14][lane] * mean[15][lane] + hessian[10][lane] * mean[14][lane]);
+        work[6][lane] = t73 * t37 + t74 * t34 + (t75 * t23 - t76 * t30);
+        work[7][lane] = t73 * t38 + t74 * t33 - (t76 * t29 + t75 * t20);
+        work[4][lane] = t73 * t36 + t74 * t35 + (t76 * t31 - t75 * t26);
+        work[5][lane] = t76 * t28 + t75 * t19 + (t73 * t18 + t74 * t32);
+        const double t81 = hessian[10][lane] * t51 + hessian[14][lane] * t52 + (hessian[2][lane] * t53 + hessian[6][lane] * t54) + (t21 * work[6][lane] + t1 * work[7][lane] + (t25 * work[4][lane] - t24 * work[5][lane]));
+        const double t82 = 1.0 - (hessian[11][lane] * mean[30][lane] + hessian[15][lane] * mean[31][lane] + (hessian[3][lane] * mean[28][lane] + hessian[7][lane] * mean[29][lane]));
+        const double t83 = hessian[11][lane] * mean[22][lane] + hessian[15][lane] * mean[23][lane] + (hessian[7][lane] * mean[21][lane] + hessian[3][lane] * mean[20][lane]);
+        const double t84 = hessian[11][lane] * mean[6][lane] + hessian[15][lane] * mean[7][lane] + (hessian[3][lane] * mean[4][lane] + hessian[7][lane] * mean[5][lane]);
+        const double t85 = hessian[11][lane] * mean[14][lane] + hessian[15][lane] * mean[15][lane] + (hessian[3][lane] * mean[12][lane] + hessian[7][lane] * mean[13][lane]);
+        work[8][lane] = t82 * t18 + t83 * t32 - (t84 * t19 + t85 * t28);
+        work[9][lane] = t85 * t31 - t84 * t26 - (t82 * t36 + t83 * t35);
+        work[10][lane] = t84 * t23 - t85 * t30 - (t82 * t37 + t83 * t34);
+        work[11][lane] = t82 * t38 + t83 * t33 + (t84 * t20 + t85 * t29);
+        const double t90 = hessian[3][lane] * t53 + hessian[7][lane] * t54 + (hessian[11][lane] * t51 + hessian[15][lane] * t52) + (t24 * work[8][lane] + t25 * work[9][lane] + (t21 * work[10][lane] - t1 * work[11][lane]));
+        const double t91 = even[13][lane] - odd[13][lane];
+        const double t92 = even[12][lane] - odd[12][lane];
+        const double t93 = even[15][lane] - odd[15][lane];
+        const double t94 = even[14][lane] - odd[14][lane];
+        const double t95 = hessian[4][lane] * t91 + hessian[0][lane] * t92 + (hessian[12][lane] * t93 + hessian[8][lane] * t94) + (t39 * work[12][lane] + t40 * work[13][lane] + (t41 * work[15][lane] + t42 * work[14][lane]));
+        const double t96 = hessian[9][lane] * t94 + hessian[13][lane] * t93 + (hessian[1][lane] * t92 + hessian[5][lane] * t91) + (t39 * work[0][lane] + t40 * work[1][lane] + (t41 * work[2][lane] + t42 * work[3][lane]));
+        const double t97 = hessian[10][lane] * t94 + hessian[14][lane] * t93 + (hessian[6][lane] * t91 + hessian[2][lane] * t92) + (t40 * work[4][lane] - t39 * work[5][lane] + (t42 * work[6][lane] + t41 * work[7][lane]));
+        const double t98 = hessian[15][lane] * t93 + hessian[11][lane] * t94 + (hessian[7][lane] * t91 + hessian[3][lane] * t92) + (t39 * work[8][lane] + t40 * work[9][lane] + (t42 * work[10][lane] - t41 * work[11][lane]));
+        const double t99 = even[21][lane] - odd[21][lane];
+        const double t100 = even[20][lane] - odd[20][lane];
+        const double t101 = even[22][lane] - odd[22][lane];
+        const double t102 = even[23][lane] - odd[23][lane];
+        const double t103 = hessian[4][lane] * t99 + hessian[0][lane] * t100 + (hessian[8][lane] * t101 + hessian[12][lane] * t102) + (t43 * work[12][lane] + t44 * work[13][lane] + (t45 * work[15][lane] + t46 * work[14][lane]));
+        const double t104 = hessian[9][lane] * t101 + hessian[13][lane] * t102 + (hessian[5][lane] * t99 + hessian[1][lane] * t100) + (t43 * work[0][lane] + t44 * work[1][lane] + (t46 * work[3][lane] + t45 * work[2][lane]));
+        const double t105 = hessian[10][lane] * t101 + hessian[14][lane] * t102 + (hessian[6][lane] * t99 + hessian[2][lane] * t100) + (t44 * work[4][lane] - t43 * work[5][lane] + (t45 * work[7][lane] + t46 * work[6][lane]));
+        const double t106 = hessian[3][lane] * t100 + hessian[7][lane] * t99 + (hessian[11][lane] * t101 + hessian[15][lane] * t102) + (t43 * work[8][lane] + t44 * work[9][lane] + (t46 * work[10][lane] - t45 * work[11][lane]));
+        const double t107 = even[29][lane] - odd[29][lane];
+        const double t108 = even[28][lane] - odd[28][lane];
+        const double t109 = even[30][lane] - odd[30][lane];
+        const double t110 = even[31][lane] - odd[31][lane];
+        const double t111 = hessian[4][lane] * t107 + hessian[0][lane] * t108 + (hessian[8][lane] * t109 + hessian[12][lane] * t110) + (t49 * work[12][lane] + t50 * work[13][lane] + (t47 * work[15][lane] + t48 * work[14][lane]));
+        const double t112 = hessian[9][lane] * t109 + hessian[13][lane] * t110 + (hessian[5][lane] * t107 + hessian[1][lane] * t108) + (t47 * work[2][lane] + t48 * work[3][lane] + (t49 * work[0][lane] + t50 * work[1][lane]));
+        const double t113 = hessian[10][lane] * t109 + hessian[14][lane] * t110 + (hessian[6][lane] * t107 + hessian[2][lane] * t108) + (t50 * work[4][lane] - t49 * work[5][lane] + (t47 * work[7][lane] + t48 * work[6][lane]));
+        const double t114 = hessian[3][lane] * t108 + hessian[7][lane] * t107 + (hessian[15][lane] * t110 + hessian[11][lane] * t109) + (t48 * work[10][lane] - t47 * work[11][lane] + (t49 * work[8][lane] + t50 * work[9][lane]));
+        const double t115 = 2.0 * (hessian[0][lane] * odd[4][lane]) + 2.0 * (hessian[4][lane] * odd[5][lane]) + (2.0 * (hessian[8][lane] * odd[6][lane]) + 2.0 * (hessian[12][lane] * odd[7][lane])) + (2.0 * (odd[0][lane] * work[15][lane]) + 2.0 * (odd[1][lane] * work[14][lane]) + (2.0 * (odd[3][lane] * work[12][lane]) + 2.0 * (odd[2][lane] * work[13][lane])));
+        const double t116 = 2.0 * (hessian[9][lane] * odd[6][lane]) + 2.0 * (hessian[13][lane] * odd[7][lane]) + (2.0 * (hessian[1][lane] * odd[4][lane]) + 2.0 * (hessian[5][lane] * odd[5][lane])) + (2.0 * (odd[0][lane] * work[2][lane]) + 2.0 * (odd[1][lane] * work[3][lane]) + (2.0 * (odd[3][lane] * work[0][lane]) + 2.0 * (odd[2][lane] * work[1][lane])));
+        const double t117 = 2.0 * (hessian[2][lane] * odd[4][lane]) + 2.0 * (hessian[6][lane] * odd[5][lane]) + (2.0 * (hessian[14][lane] * odd[7][lane]) + 2.0 * (hessian[10][lane] * odd[6][lane])) + (2.0 * (odd[2][lane] * work[4][lane]) - 2.0 * (odd[3][lane] * work[5][lane]) + (2.0 * (odd[1][lane] * work[6][lane]) + 2.0 * (odd[0][lane] * work[7][lane])));
+        const double t118 = 2.0 * (hessian[3][lane] * odd[4][lane]) + 2.0 * (hessian[7][lane] * odd[5][lane]) + (2.0 * (hessian[15][lane] * odd[7][lane]) + 2.0 * (hessian[11][lane] * odd[6][lane])) + (2.0 * (odd[1][lane] * work[10][lane]) - 2.0 * (odd[0][lane] * work[11][lane]) + (2.0 * (odd[3][lane] * work[8][lane]) + 2.0 * (odd[2][lane] * work[9][lane])));
+        const double t119 = 2.0 * (hessian[0][lane] * odd[12][lane]) + 2.0 * (hessian[4][lane] * odd[13][lane]) + (2.0 * (hessian[8][lane] * odd[14][lane]) + 2.0 * (hessian[12][lane] * odd[15][lane])) + (2.0 * (odd[11][lane] * work[12][lane]) + 2.0 * (odd[10][lane] * work[13][lane]) + (2.0 * (odd[9][lane] * work[14][lane]) + 2.0 * (odd[8][lane] * work[15][lane])));
+        const double t120 = 2.0 * (hessian[9][lane] * odd[14][lane]) + 2.0 * (hessian[13][lane] * odd[15][lane]) + (2.0 * (hessian[5][lane] * odd[13][lane]) + 2.0 * (hessian[1][lane] * odd[12][lane])) + (2.0 * (odd[11][lane] * work[0][lane]) + 2.0 * (odd[10][lane] * work[1][lane]) + (2.0 * (odd[8][lane] * work[2][lane]) + 2.0 * (odd[9][lane] * work[3][lane])));
+        const double t121 = 2.0 * (hessian[2][lane] * odd[12][lane]) + 2.0 * (hessian[6][lane] * odd[13][lane]) + (2.0 * (hessian[14][lane] * odd[15][lane]) + 2.0 * (hessian[10][lane] * odd[14][lane])) + (2.0 * (odd[10][lane] * work[4][lane]) - 2.0 * (odd[11][lane] * work[5][lane]) + (2.0 * (odd[8][lane] * work[7][lane]) + 2.0 * (odd[9][lane] * work[6][lane])));
+        const double t122 = 2.0 * (hessian[7][lane] * odd[13][lane]) + 2.0 * (hessian[3][lane] * odd[12][lane]) + (2.0 * (hessian[11][lane] * odd[14][lane]) + 2.0 * (hessian[15][lane] * odd[15][lane])) + (2.0 * (odd[9][lane] * work[10][lane]) - 2.0 * (odd[8][lane] * work[11][lane]) + (2.0 * (odd[11][lane] * work[8][lane]) + 2.0 * (odd[10][lane] * work[9][lane])));
+        const double t123 = 2.0 * (hessian[12][lane] * odd[23][lane]) + 2.0 * (hessian[8][lane] * odd[22][lane]) + (2.0 * (hessian[4][lane] * odd[21][lane]) + 2.0 * (hessian[0][lane] * odd[20][lane])) + (2.0 * (odd[19][lane] * work[12][lane]) + 2.0 * (odd[18][lane] * work[13][lane]) + (2.0 * (odd[16][lane] * work[15][lane]) + 2.0 * (odd[17][lane] * work[14][lane])));
+        reciprocal[0][lane] = t2;
+        reciprocal[1][lane] = t4;
+        reciprocal[2][lane] = t10;
+        reciprocal[3][lane] = t18;
+        alpha_y[0][lane] = t1 * t20 - t21 * t23 + (t24 * t19 + t25 * t26);
+        increment_y[0][lane] = 2.0 * (odd[0][lane] * t20) - 2.0 * (odd[1][lane] * t23) + (2.0 * (odd[3][lane] * t19) + 2.0 * (odd[2][lane] * t26));
+        increment_y[4][lane] = 2.0 * (odd[11][lane] * t19) + 2.0 * (odd[10][lane] * t26) + (2.0 * (odd[8][lane] * t20) - 2.0 * (odd[9][lane] * t23));
+        increment_y[8][lane] = 2.0 * (odd[19][lane] * t19) + 2.0 * (odd[18][lane] * t26) + (2.0 * (odd[16][lane] * t20) - 2.0 * (odd[17][lane] * t23));
+        increment_y[12][lane] = 2.0 * (odd[24][lane] * t20) - 2.0 * (odd[25][lane] * t23) + (2.0 * (odd[27][lane] * t19) + 2.0 * (odd[26][lane] * t26));
+        alpha_y[1][lane] = t1 * t29 + t21 * t30 + (t24 * t28 - t25 * t31);
+        increment_y[1][lane] = 2.0 * (odd[1][lane] * t30) + 2.0 * (odd[0][lane] * t29) + (2.0 * (odd[3][lane] * t28) - 2.0 * (odd[2][lane] * t31));
+        increment_y[5][lane] = 2.0 * (odd[9][lane] * t30) + 2.0 * (odd[8][lane] * t29) + (2.0 * (odd[11][lane] * t28) - 2.0 * (odd[10][lane] * t31));
+        increment_y[9][lane] = 2.0 * (odd[16][lane] * t29) + 2.0 * (odd[17][lane] * t30) + (2.0 * (odd[19][lane] * t28) - 2.0 * (odd[18][lane] * t31));
+        increment_y[13][lane] = 2.0 * (odd[24][lane] * t29) + 2.0 * (odd[25][lane] * t30) + (2.0 * (odd[27][lane] * t28) - 2.0 * (odd[26][lane] * t31));
+        alpha_y[2][lane] = t1 * t33 + t21 * t34 + (t25 * t35 - t24 * t32);
+        increment_y[2][lane] = 2.0 * (odd[1][lane] * t34) + 2.0 * (odd[0][lane] * t33) + (2.0 * (odd[2][lane] * t35) - 2.0 * (odd[3][lane] * t32));
+        increment_y[6][lane] = 2.0 * (odd[10][lane] * t35) - 2.0 * (odd[11][lane] * t32) + (2.0 * (odd[8][lane] * t33) + 2.0 * (odd[9][lane] * t34));
+        increment_y[10][lane] = 2.0 * (odd[18][lane] * t35) - 2.0 * (odd[19][lane] * t32) + (2.0 * (odd[16][lane] * t33) + 2.0 * (odd[17][lane] * t34));
+        increment_y[14][lane] = 2.0 * (odd[26][lane] * t35) - 2.0 * (odd[27][lane] * t32) + (2.0 * (odd[24][lane] * t33) + 2.0 * (odd[25][lane] * t34));
+        alpha_y[3][lane] = t24 * t18 - t25 * t36 - (t21 * t37 + t1 * t38);
+        increment_y[3][lane] = (-2.0) * (odd[0][lane] * t38) - 2.0 * (odd[1][lane] * t37) + (2.0 * (odd[3][lane] * t18) - 2.0 * (odd[2][lane] * t36));
+        increment_y[7][lane] = (-2.0) * (odd[8][lane] * t38) - 2.0 * (odd[9][lane] * t37) + (2.0 * (odd[11][lane] * t18) - 2.0 * (odd[10][lane] * t36));
+        increment_y[11][lane] = (-2.0) * (odd[16][lane] * t38) - 2.0 * (odd[17][lane] * t37) + (2.0 * (odd[19][lane] * t18) - 2.0 * (odd[18][lane] * t36));
+        increment_y[15][lane] = (-2.0) * (odd[24][lane] * t38) - 2.0 * (odd[25][lane] * t37) + (2.0 * (odd[27][lane] * t18) - 2.0 * (odd[26][lane] * t36));
+        alpha_y[4][lane] = t39 * t19 + t40 * t26 + (t41 * t20 - t42 * t23);
+        alpha_y[5][lane] = t41 * t29 + t42 * t30 + (t39 * t28 - t40 * t31);
+        alpha_y[6][lane] = t42 * t34 + t41 * t33 + (t40 * t35 - t39 * t32);
+        alpha_y[7][lane] = t39 * t18 - t40 * t36 - (t41 * t38 + t42 * t37);
+        alpha_y[8][lane] = t43 * t19 + t44 * t26 + (t45 * t20 - t46 * t23);
+        alpha_y[9][lane] = t45 * t29 + t46 * t30 + (t43 * t28 - t44 * t31);
+        alpha_y[10][lane] = t45 * t33 + t46 * t34 + (t44 * t35 - t43 * t32);
+        alpha_y[11][lane] = t43 * t18 - t44 * t36 - (t46 * t37 + t45 * t38);
+        alpha_y[12][lane] = t47 * t20 - t48 * t23 + (t49 * t19 + t50 * t26);
+        alpha_y[13][lane] = t49 * t28 - t50 * t31 + (t48 * t30 + t47 * t29);
+        alpha_y[14][lane] = t50 * t35 - t49 * t32 + (t48 * t34 + t47 * t33);
+        alpha_y[15][lane] = t49 * t18 - t50 * t36 - (t48 * t37 + t47 * t38);
+        sway[4][lane] = work[14][lane];
+        sway[0][lane] = work[15][lane] - 1.0;
+        sway[12][lane] = work[12][lane];
+        sway[8][lane] = work[13][lane];
+        jacobian[0][lane] = t63;
+        sway[13][lane] = work[0][lane];
+        sway[9][lane] = work[1][lane];
+        sway[1][lane] = work[2][lane];
+        sway[5][lane] = work[3][lane] - 1.0;
+        jacobian[1][lane] = t72;
+        sway[6][lane] = work[6][lane];
+        sway[2][lane] = work[7][lane];
+        sway[10][lane] = work[4][lane] - 1.0;
+        sway[14][lane] = -work[5][lane];
+        jacobian[2][lane] = t81;
+        sway[15][lane] = work[8][lane] - 1.0;
+        sway[11][lane] = work[9][lane];
+        sway[7][lane] = work[10][lane];
+        sway[3][lane] = -work[11][lane];
+        jacobian[3][lane] = t90;
+        jacobian[4][lane] = t95;
+        jacobian[5][lane] = t96;
+        jacobian[6][lane] = t97;
+        jacobian[7][lane] = t98;
+        jacobian[8][lane] = t103;
+        jacobian[9][lane] = t104;
+        jacobian[10][lane] = t105;
+        jacobian[11][lane] = t106;
+        jacobian[12][lane] = t111;
+        jacobian[13][lane] = t112;
+        jacobian[14][lane] = t113;
+        jacobian[15][lane] = t114;
+        increment_jacobian[0][lane] = t115;
+        increment_jacobian[1][lane] = t116;
+        increment_jacobian[2][lane] = t117;
+        increment_jacobian[3][lane] = t118;
+        increment_jacobian[4][lane] = t119;
+        increment_jacobian[5][lane] = t120;
+        increment_jacobian[6][lane] = t121;
+        increment_jacobian[7][lane] = t122;
+        increment_jacobian[8][lane] = t123;
+    }
+}
+
+/* sklyanin_gyrostat_along_mean_lanes_part2 (part 2 of 2) */
+sklyanin_gyrostat_APART static void sklyanin_gyrostat_along_mean_lanes_part2(
+                                                                             sklyanin_gyrostat_lanes even[restrict 32],
+                                                                             sklyanin_gyrostat_lanes odd[restrict 32],
+                                                                             sklyanin_gyrostat_lanes mean[restrict 32],
+                                                                             sklyanin_gyrostat_lanes hessian[restrict 16],
+                                                                             sklyanin_gyrostat_lanes alpha_y[restrict 16],
+                                                                             sklyanin_gyrostat_lanes increment_y[restrict 16],
+                                                                             sklyanin_gyrostat_lanes jacobian[restrict 16],
+                                                                             sklyanin_gyrostat_lanes increment_jacobian[restrict 16],
+                                                                             sklyanin_gyrostat_lanes sway[restrict 16],
+                                                                             sklyanin_gyrostat_lanes reciprocal[restrict 4],
+                                                                             sklyanin_gyrostat_lanes work[restrict 16])
+{
+    (void)even;
+    (void)mean;
+    (void)alpha_y;
+    (void)increment_y;
+    (void)jacobian;
+    (void)sway;
+    (void)reciprocal;
+    sklyanin_gyrostat_EACH_LANE
+    for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) {
+        const double t124 = 2.0 * (hessian[1][lane] * odd[20][lane]) + 2.0 * (hessian[5][lane] * odd[21][lane]) + (2.0 * (hessian[13][lane] * odd[23][lane]) + 2.0 * (hessian[9][lane] * odd[22][lane])) + (2.0 * (odd[19][lane] * work[0][lane]) + 2.0 * (odd[18][lane] * work[1][lane]) + (2.0 * (odd[16][lane] * work[2][lane]) + 2.0 * (odd[17][lane] * work[3][lane])));
+        const double t125 = 2.0 * (hessian[6][lane] * odd[21][lane]) + 2.0 * (hessian[2][lane] * odd[20][lane]) + (2.0 * (hessian[10][lane] * odd[22][lane]) + 2.0 * (hessian[14][lane] * odd[23][lane])) + (2.0 * (odd[18][lane] * work[4][lane]) - 2.0 * (odd[19][lane] * work[5][lane]) + (2.0 * (odd[17][lane] * work[6][lane]) + 2.0 * (odd[16][lane] * work[7][lane])));
+        const double t126 = 2.0 * (hessian[15][lane] * odd[23][lane]) + 2.0 * (hessian[11][lane] * odd[22][lane]) + (2.0 * (hessian[3][lane] * odd[20][lane]) + 2.0 * (hessian[7][lane] * odd[21][lane])) + (2.0 * (odd[19][lane] * work[8][lane]) + 2.0 * (odd[18][lane] * work[9][lane]) + (2.0 * (odd[17][lane] * work[10][lane]) - 2.0 * (odd[16][lane] * work[11][lane])));
+        const double t127 = 2.0 * (hessian[0][lane] * odd[28][lane]) + 2.0 * (hessian[4][lane] * odd[29][lane]) + (2.0 * (hessian[12][lane] * odd[31][lane]) + 2.0 * (hessian[8][lane] * odd[30][lane])) + (2.0 * (odd[27][lane] * work[12][lane]) + 2.0 * (odd[26][lane] * work[13][lane]) + (2.0 * (odd[25][lane] * work[14][lane]) + 2.0 * (odd[24][lane] * work[15][lane])));
+        const double t128 = 2.0 * (hessian[9][lane] * odd[30][lane]) + 2.0 * (hessian[13][lane] * odd[31][lane]) + (2.0 * (hessian[1][lane] * odd[28][lane]) + 2.0 * (hessian[5][lane] * odd[29][lane])) + (2.0 * (odd[27][lane] * work[0][lane]) + 2.0 * (odd[26][lane] * work[1][lane]) + (2.0 * (odd[24][lane] * work[2][lane]) + 2.0 * (odd[25][lane] * work[3][lane])));
+        const double t129 = 2.0 * (hessian[10][lane] * odd[30][lane]) + 2.0 * (hessian[14][lane] * odd[31][lane]) + (2.0 * (hessian[2][lane] * odd[28][lane]) + 2.0 * (hessian[6][lane] * odd[29][lane])) + (2.0 * (odd[25][lane] * work[6][lane]) + 2.0 * (odd[24][lane] * work[7][lane]) + (2.0 * (odd[26][lane] * work[4][lane]) - 2.0 * (odd[27][lane] * work[5][lane])));
+        const double t130 = 2.0 * (hessian[7][lane] * odd[29][lane]) + 2.0 * (hessian[3][lane] * odd[28][lane]) + (2.0 * (hessian[11][lane] * odd[30][lane]) + 2.0 * (hessian[15][lane] * odd[31][lane])) + (2.0 * (odd[25][lane] * work[10][lane]) - 2.0 * (odd[24][lane] * work[11][lane]) + (2.0 * (odd[27][lane] * work[8][lane]) + 2.0 * (odd[26][lane] * work[9][lane])));
+        increment_jacobian[9][lane] = t124;
+        increment_jacobian[10][lane] = t125;
+        increment_jacobian[11][lane] = t126;
+        increment_jacobian[12][lane] = t127;
+        increment_jacobian[13][lane] = t128;
+        increment_jacobian[14][lane] = t129;
+        increment_jacobian[15][lane] = t130;
+    }
+}
+
+/* sklyanin_gyrostat_along_mean in all lanes. */
+static void sklyanin_gyrostat_along_mean_lanes(sklyanin_gyrostat_lanes even[restrict 32],
+                                               sklyanin_gyrostat_lanes odd[restrict 32],
+                                               sklyanin_gyrostat_lanes mean[restrict 32],
+                                               sklyanin_gyrostat_lanes hessian[restrict 16],
+                                               sklyanin_gyrostat_lanes alpha_y[restrict 16],
+                                               sklyanin_gyrostat_lanes increment_y[restrict 16],
+                                               sklyanin_gyrostat_lanes jacobian[restrict 16],
+                                               sklyanin_gyrostat_lanes increment_jacobian[restrict 16],
+                                               sklyanin_gyrostat_lanes sway[restrict 16],
+                                               sklyanin_gyrostat_lanes reciprocal[restrict 4])
+{
+    sklyanin_gyrostat_lanes work[16];
+    sklyanin_gyrostat_along_mean_lanes_part1(even, odd, mean, hessian, alpha_y, increment_y, jacobian, increment_jacobian, sway, reciprocal, work);
+    sklyanin_gyrostat_along_mean_lanes_part2(even, odd, mean, hessian, alpha_y, increment_y, jacobian, increment_jacobian, sway, reciprocal, work);
+}
+
+/* sklyanin_gyrostat_invert in all lanes. */
+static void sklyanin_gyrostat_invert_lanes(sklyanin_gyrostat_lanes matrix[restrict 16],
+                                           sklyanin_gyrostat_lanes slope[restrict 16],
+                                           sklyanin_gyrostat_lanes inverse[restrict 16],
+                                           sklyanin_gyrostat_lanes gain[restrict 16],
+                                           sklyanin_gyrostat_lanes reciprocal[restrict 4])
+{
+    sklyanin_gyrostat_EACH_LANE
+    for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) {
+        const double t1 = 1.0 / matrix[0][lane];
+        const double t2 = matrix[1][lane] * t1;
+        const double t3 = 1.0 / (matrix[5][lane] - matrix[4][lane] * t2);
+        const double t4 = matrix[4][lane] * t1 * t3;
+        const double t5 = matrix[2][lane] * t1;
+        const double t6 = (matrix[6][lane] - matrix[4][lane] * t5) * t3;
+        const double t7 = t5 - t2 * t6;
+        const double t8 = matrix[9][lane] - matrix[8][lane] * t2;
+        const double t9 = 1.0 / (matrix[10][lane] - matrix[8][lane] * t5 - t8 * t6);
+        const double t10 = (t8 * t4 - matrix[8][lane] * t1) * t9;
+        const double t11 = matrix[3][lane] * t1;
+        const double t12 = (matrix[7][lane] - matrix[4][lane] * t11) * t3;
+        const double t13 = (matrix[11][lane] - matrix[8][lane] * t11 - t8 * t12) * t9;
+        const double t14 = t11 - t2 * t12 - t7 * t13;
+        const double t15 = matrix[13][lane] - matrix[12][lane] * t2;
+        const double t16 = matrix[14][lane] - matrix[12][lane] * t5 - t15 * t6;
+        const double t17 = 1.0 / (matrix[15][lane] - matrix[12][lane] * t11 - t15 * t12 - t16 * t13);
+        const double t18 = (t15 * t4 - matrix[12][lane] * t1 - t16 * t10) * t17;
+        const double t19 = t1 + t2 * t4 - t7 * t10 - t14 * t18;
+        const double t20 = t8 * t3 * t9;
+        const double t21 = (t16 * t20 - t15 * t3) * t17;
+        const double t22 = t7 * t20 - t2 * t3 - t14 * t21;
+        const double t23 = t16 * t9 * t17;
+        const double t24 = t14 * t23 - t7 * t9;
+        const double t25 = t14 * t17;
+        const double t26 = t12 - t6 * t13;
+        const double t27 = t4 + t6 * t10 + t26 * t18;
+        const double t28 = t3 + t6 * t20 - t26 * t21;
+        const double t29 = t26 * t23 - t6 * t9;
+        const double t30 = t26 * t17;
+        const double t31 = t10 - t13 * t18;
+        const double t32 = t20 + t13 * t21;
+        const double t33 = t9 + t13 * t23;
+        const double t34 = t13 * t17;
+        inverse[0][lane] = t19;
+        inverse[1][lane] = t22;
+        inverse[2][lane] = t24;
+        inverse[3][lane] = -t25;
+        inverse[4][lane] = -t27;
+        inverse[5][lane] = t28;
+        inverse[6][lane] = t29;
+        inverse[7][lane] = -t30;
+        inverse[8][lane] = t31;
+        inverse[9][lane] = -t32;
+        inverse[10][lane] = t33;
+        inverse[11][lane] = -t34;
+        inverse[12][lane] = t18;
+        inverse[13][lane] = t21;
+        inverse[14][lane] = -t23;
+        inverse[15][lane] = t17;
+        gain[0][lane] = slope[0][lane] * t19 - slope[1][lane] * t27 + (slope[3][lane] * t18 + slope[2][lane] * t31);
+        gain[1][lane] = slope[0][lane] * t22 + slope[1][lane] * t28 + (slope[3][lane] * t21 - slope[2][lane] * t32);
+        gain[2][lane] = slope[2][lane] * t33 - slope[3][lane] * t23 + (slope[0][lane] * t24 + slope[1][lane] * t29);
+        gain[3][lane] = slope[3][lane] * t17 - slope[2][lane] * t34 - (slope[1][lane] * t30 + slope[0][lane] * t25);
+        gain[4][lane] = slope[4][lane] * t19 - slope[5][lane] * t27 + (slope[7][lane] * t18 + slope[6][lane] * t31);
+        gain[5][lane] = slope[7][lane] * t21 - slope[6][lane] * t32 + (slope[5][lane] * t28 + slope[4][lane] * t22);
+        gain[6][lane] = slope[6][lane] * t33 - slope[7][lane] * t23 + (slope[5][lane] * t29 + slope[4][lane] * t24);
+        gain[7][lane] = slope[7][lane] * t17 - slope[6][lane] * t34 - (slope[4][lane] * t25 + slope[5][lane] * t30);
+        gain[8][lane] = slope[11][lane] * t18 + slope[10][lane] * t31 + (slope[8][lane] * t19 - slope[9][lane] * t27);
+        gain[9][lane] = slope[9][lane] * t28 + slope[8][lane] * t22 + (slope[11][lane] * t21 - slope[10][lane] * t32);
+        gain[10][lane] = slope[10][lane] * t33 - slope[11][lane] * t23 + (slope[9][lane] * t29 + slope[8][lane] * t24);
+        gain[11][lane] = slope[11][lane] * t17 - slope[10][lane] * t34 - (slope[9][lane] * t30 + slope[8][lane] * t25);
+        gain[12][lane] = slope[15][lane] * t18 + slope[14][lane] * t31 + (slope[12][lane] * t19 - slope[13][lane] * t27);
+        gain[13][lane] = slope[13][lane] * t28 + slope[12][lane] * t22 + (slope[15][lane] * t21 - slope[14][lane] * t32);
+        gain[14][lane] = slope[14][lane] * t33 - slope[15][lane] * t23 + (slope[13][lane] * t29 + slope[12][lane] * t24);
+        gain[15][lane] = slope[15][lane] * t17 - slope[14][lane] * t34 - (slope[12][lane] * t25 + slope[13][lane] * t30);
+        reciprocal[0][lane] = t1;
+        reciprocal[1][lane] = t3;
+        reciprocal[2][lane] = t9;
+        reciprocal[3][lane] = t17;
+    }
+}
+
+/* sklyanin_gyrostat_size in all lanes, summed over the components. */
+static void sklyanin_gyrostat_sizes(sklyanin_gyrostat_lanes y[restrict 4], sklyanin_gyrostat_lanes delta[restrict 4],
+    sklyanin_gyrostat_lanes size)
+{
+    sklyanin_gyrostat_lanes norm = { 0.0 };
+    memset(size, 0, sklyanin_gyrostat_LANES * sizeof size[0]);
+    for (int i = 0; i < 4; ++i)
+        for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane)
+            norm[lane] = 1e-6 * fabs(y[i][lane]) > norm[lane] ? 1e-6 * fabs(y[i][lane]) : norm[lane];
+    for (int i = 0; i < 4; ++i) {
+        sklyanin_gyrostat_EACH_LANE
+        for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane)
+            size[lane] += fabs(delta[i][lane]) / (fabs(y[i][lane]) + norm[lane] + DBL_MIN);
+    }
+}
+
+/* Correct y by the residuals, with the inverse in the table, and measure the corrections. */
+static void sklyanin_gyrostat_correct(sklyanin_gyrostat_model *model, sklyanin_gyrostat_lanes size)
+{
+    sklyanin_gyrostat_lanes delta[4];
+    memset(delta, 0, sizeof delta);
+    for (int i = 0; i < 4; ++i)
+        for (int j = 0; j < 4; ++j) {
+            sklyanin_gyrostat_EACH_LANE
+            for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane)
+                delta[i][lane] += model->inverse[i * 4 + j][lane] * model->residual[j][lane];
+        }
+    sklyanin_gyrostat_sizes(model->y, delta, size);
+    for (int i = 0; i < 4; ++i)
+        for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) model->y[i][lane] -= delta[i][lane];
+}
+
+/* The largest of the lanes, none of which is negative; infinite if one is not finite. As integers, the bits of such
+   numbers have their order, and those of what is no number are larger. */
+static double sklyanin_gyrostat_largest(const sklyanin_gyrostat_lanes size)
+{
+    uint64_t bits[8], most = 0;
+    double largest;
+    memcpy(bits, size, sizeof bits);
+    for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) most = bits[lane] > most ? bits[lane] : most;
+    memcpy(&largest, &most, sizeof largest);
+    return isfinite(largest) ? largest : HUGE_VAL;
+}
+
+/* sklyanin_gyrostat_near for the guesses of all lanes, seen from one value. */
+static int sklyanin_gyrostat_near_lanes(sklyanin_gyrostat_lanes y[restrict 4], const double last[4])
+{
+    sklyanin_gyrostat_lanes distance = { 0.0 };
+    double size = 0.0;
+    for (int i = 0; i < 4; ++i) {
+        size += fabs(last[i]);
+        sklyanin_gyrostat_EACH_LANE
+        for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) distance[lane] += fabs(y[i][lane] - last[i]);
+    }
+    return sklyanin_gyrostat_largest(distance) <= 4.0 * size;
+}
+
+/* What is left after a correction of this size: quadratic in it, where the matrices are of the points corrected; where
+   they are of points further off, by bend, also of the order of size times bend. bound is what the last pass left. */
+static double sklyanin_gyrostat_remaining(double size, double bend, double bound)
+{
+    const double growth = size / bound, left = size * (size + bend);
+    return growth > 1.0 ? growth * left : left;
+}
+
+/* The paths of all lanes as Taylor series about their middle, with half of p: they take the time from -1 to 1, and need
+   fewer terms than from their start. s[i][k] is coefficient k of series i, the coordinates first; slope goes on with the
+   entries of d(pi p)/dm and of pi, from which v follows, the derivatives along middle and p, row by row. */
+typedef struct {
+    sklyanin_gyrostat_lanes p[4], fixed[1], slope_fixed[1], value[40];
+    sklyanin_gyrostat_lanes s[40][16 + 1], slope[51][12 + 1];
+    sklyanin_gyrostat_lanes v[12 + 1][32];
+    sklyanin_gyrostat_lanes even[4], odd[4], mean[4]; /* sums of terms, those of even order also as means over time */
+    sklyanin_gyrostat_lanes v_even[32], v_odd[32], v_mean[32];
+    sklyanin_gyrostat_lanes unit[4]; /* what terms are measured by */
+    int terms; /* orders that are known */
+} sklyanin_gyrostat_expansion;
+
+/* The largest of the lanes; what is not finite does not count: that lane has failed. */
+static double sklyanin_gyrostat_largest_finite(const sklyanin_gyrostat_lanes size)
+{
+    sklyanin_gyrostat_lanes finite;
+    for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) finite[lane] = size[lane] <= DBL_MAX ? size[lane] : 0.0;
+    return sklyanin_gyrostat_largest(finite);
+}
+
+/* Coefficient k >= 1 of the series that follow from those of the coordinates: sums over the orders between 0 and k, then what else there is. */
+static void sklyanin_gyrostat_follow(sklyanin_gyrostat_lanes coef[restrict], sklyanin_gyrostat_expansion *e, int k)
+{
+    const double share = 1.0 / k;
+    sklyanin_gyrostat_lanes sum[6];
+    (void)coef, (void)e, (void)share;
+    memset(sum, 0, sizeof sum);
+    for (int j = 1; j < k; ++j) {
+        sklyanin_gyrostat_EACH_LANE
+        for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) {
+            sum[0][lane] += e->s[1][j][lane] * e->s[3][k - j][lane];
+            sum[1][lane] += e->s[2][j][lane] * e->s[3][k - j][lane];
+            sum[2][lane] += e->s[1][j][lane] * e->s[2][k - j][lane];
+            sum[3][lane] += e->s[0][j][lane] * e->s[3][k - j][lane];
+            sum[4][lane] += e->s[0][j][lane] * e->s[2][k - j][lane];
+            sum[5][lane] += e->s[0][j][lane] * e->s[1][k - j][lane];
+        }
+    }
+    sklyanin_gyrostat_EACH_LANE
+    for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) {
+        e->s[4][k][lane] = sum[0][lane] + e->s[1][0][lane] * e->s[3][k][lane] + e->s[1][k][lane] * e->s[3][0][lane];
+        e->s[5][k][lane] = e->p[2][lane] * e->s[4][k][lane];
+        e->s[6][k][lane] = 3.0 * e->s[5][k][lane];
+        e->s[7][k][lane] = sum[1][lane] + e->s[2][0][lane] * e->s[3][k][lane] + e->s[2][k][lane] * e->s[3][0][lane];
+        e->s[8][k][lane] = e->p[1][lane] * e->s[7][k][lane];
+        e->s[9][k][lane] = 2.0 * e->s[8][k][lane];
+        e->s[10][k][lane] = e->s[6][k][lane] - e->s[9][k][lane];
+        e->s[11][k][lane] = sum[2][lane] + e->s[1][0][lane] * e->s[2][k][lane] + e->s[1][k][lane] * e->s[2][0][lane];
+        e->s[12][k][lane] = e->p[3][lane] * e->s[11][k][lane];
+        e->s[13][k][lane] = e->s[10][k][lane] - e->s[12][k][lane];
+        e->s[14][k][lane] = e->p[0][lane] * e->s[7][k][lane];
+        e->s[15][k][lane] = 2.0 * e->s[14][k][lane];
+        e->s[16][k][lane] = sum[3][lane] + e->s[0][0][lane] * e->s[3][k][lane] + e->s[0][k][lane] * e->s[3][0][lane];
+        e->s[17][k][lane] = e->p[2][lane] * e->s[16][k][lane];
+        e->s[18][k][lane] = 2.0 * e->s[17][k][lane];
+        e->s[19][k][lane] = e->s[15][k][lane] + e->s[18][k][lane];
+        e->s[20][k][lane] = sum[4][lane] + e->s[0][0][lane] * e->s[2][k][lane] + e->s[0][k][lane] * e->s[2][0][lane];
+        e->s[21][k][lane] = e->p[3][lane] * e->s[20][k][lane];
+        e->s[22][k][lane] = 2.0 * e->s[21][k][lane];
+        e->s[23][k][lane] = e->s[19][k][lane] - e->s[22][k][lane];
+        e->s[24][k][lane] = sum[5][lane] + e->s[0][0][lane] * e->s[1][k][lane] + e->s[0][k][lane] * e->s[1][0][lane];
+        e->s[25][k][lane] = e->p[3][lane] * e->s[24][k][lane];
+        e->s[26][k][lane] = 2.0 * e->s[25][k][lane];
+        e->s[27][k][lane] = e->p[0][lane] * e->s[4][k][lane];
+        e->s[28][k][lane] = -3.0 * e->s[27][k][lane];
+        e->s[29][k][lane] = e->p[1][lane] * e->s[16][k][lane];
+        e->s[30][k][lane] = 2.0 * e->s[29][k][lane];
+        e->s[31][k][lane] = e->s[28][k][lane] - e->s[30][k][lane];
+        e->s[32][k][lane] = e->s[26][k][lane] + e->s[31][k][lane];
+        e->s[33][k][lane] = e->p[0][lane] * e->s[11][k][lane];
+        e->s[34][k][lane] = e->p[1][lane] * e->s[20][k][lane];
+        e->s[35][k][lane] = 2.0 * e->s[34][k][lane];
+        e->s[36][k][lane] = e->s[33][k][lane] + e->s[35][k][lane];
+        e->s[37][k][lane] = e->p[2][lane] * e->s[24][k][lane];
+        e->s[38][k][lane] = 2.0 * e->s[37][k][lane];
+        e->s[39][k][lane] = e->s[36][k][lane] - e->s[38][k][lane];
+    }
+}
+
+/* Coefficient k >= 1 of the further series: sums over the orders between 0 and k, then what else there is. */
+static void sklyanin_gyrostat_follow_slopes(sklyanin_gyrostat_lanes coef[restrict], sklyanin_gyrostat_expansion *e, int k)
+{
+    const double share = 1.0 / k;
+    sklyanin_gyrostat_lanes sum[1];
+    (void)coef, (void)e, (void)share;
+    memset(sum, 0, sizeof sum);
+    for (int j = 1; j < k; ++j) {
+    }
+    sklyanin_gyrostat_EACH_LANE
+    for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) {
+        e->slope[0][k][lane] = e->p[2][lane] * e->s[3][k][lane];
+        e->slope[1][k][lane] = 3.0 * e->slope[0][k][lane];
+        e->slope[2][k][lane] = e->p[3][lane] * e->s[2][k][lane];
+        e->slope[3][k][lane] = e->slope[1][k][lane] - e->slope[2][k][lane];
+        e->slope[4][k][lane] = e->p[1][lane] * e->s[3][k][lane];
+        e->slope[5][k][lane] = -2.0 * e->slope[4][k][lane];
+        e->slope[6][k][lane] = e->p[3][lane] * e->s[1][k][lane];
+        e->slope[7][k][lane] = e->slope[5][k][lane] - e->slope[6][k][lane];
+        e->slope[8][k][lane] = e->p[2][lane] * e->s[1][k][lane];
+        e->slope[9][k][lane] = 3.0 * e->slope[8][k][lane];
+        e->slope[10][k][lane] = e->p[1][lane] * e->s[2][k][lane];
+        e->slope[11][k][lane] = 2.0 * e->slope[10][k][lane];
+        e->slope[12][k][lane] = e->slope[9][k][lane] - e->slope[11][k][lane];
+        e->slope[13][k][lane] = 2.0 * e->slope[0][k][lane];
+        e->slope[14][k][lane] = 2.0 * e->slope[2][k][lane];
+        e->slope[15][k][lane] = e->slope[13][k][lane] - e->slope[14][k][lane];
+        e->slope[16][k][lane] = e->p[0][lane] * e->s[3][k][lane];
+        e->slope[17][k][lane] = 2.0 * e->slope[16][k][lane];
+        e->slope[18][k][lane] = e->p[3][lane] * e->s[0][k][lane];
+        e->slope[19][k][lane] = 2.0 * e->slope[18][k][lane];
+        e->slope[20][k][lane] = e->slope[17][k][lane] - e->slope[19][k][lane];
+        e->slope[21][k][lane] = e->p[2][lane] * e->s[0][k][lane];
+        e->slope[22][k][lane] = 2.0 * e->slope[21][k][lane];
+        e->slope[23][k][lane] = e->p[0][lane] * e->s[2][k][lane];
+        e->slope[24][k][lane] = 2.0 * e->slope[23][k][lane];
+        e->slope[25][k][lane] = e->slope[22][k][lane] + e->slope[24][k][lane];
+        e->slope[26][k][lane] = 2.0 * e->slope[6][k][lane];
+        e->slope[27][k][lane] = 2.0 * e->slope[4][k][lane];
+        e->slope[28][k][lane] = e->slope[26][k][lane] - e->slope[27][k][lane];
+        e->slope[29][k][lane] = 3.0 * e->slope[16][k][lane];
+        e->slope[30][k][lane] = e->slope[19][k][lane] - e->slope[29][k][lane];
+        e->slope[31][k][lane] = e->p[0][lane] * e->s[1][k][lane];
+        e->slope[32][k][lane] = -3.0 * e->slope[31][k][lane];
+        e->slope[33][k][lane] = e->p[1][lane] * e->s[0][k][lane];
+        e->slope[34][k][lane] = 2.0 * e->slope[33][k][lane];
+        e->slope[35][k][lane] = e->slope[32][k][lane] - e->slope[34][k][lane];
+        e->slope[36][k][lane] = 2.0 * e->slope[8][k][lane];
+        e->slope[37][k][lane] = e->slope[11][k][lane] - e->slope[36][k][lane];
+        e->slope[38][k][lane] = e->slope[23][k][lane] - e->slope[22][k][lane];
+        e->slope[39][k][lane] = e->slope[31][k][lane] + e->slope[34][k][lane];
+        e->slope[40][k][lane] = -2.0 * e->s[7][k][lane];
+        e->slope[41][k][lane] = 3.0 * e->s[4][k][lane];
+        e->slope[42][k][lane] = -e->s[11][k][lane];
+        e->slope[43][k][lane] = 2.0 * e->s[7][k][lane];
+        e->slope[44][k][lane] = 2.0 * e->s[16][k][lane];
+        e->slope[45][k][lane] = -2.0 * e->s[20][k][lane];
+        e->slope[46][k][lane] = -3.0 * e->s[4][k][lane];
+        e->slope[47][k][lane] = -2.0 * e->s[16][k][lane];
+        e->slope[48][k][lane] = 2.0 * e->s[24][k][lane];
+        e->slope[49][k][lane] = 2.0 * e->s[20][k][lane];
+        e->slope[50][k][lane] = -2.0 * e->s[24][k][lane];
+    }
+}
+
+/* Order k of the series, and with it order k + 1 of the coordinates. */
+static void sklyanin_gyrostat_next_order(sklyanin_gyrostat_lanes coef[restrict], sklyanin_gyrostat_expansion *e, int k)
+{
+    static const int field[4] = { 13, 23, 32, 39 };
+    if (k > 0) sklyanin_gyrostat_follow(coef, e, k);
+    for (int i = 0; i < 4; ++i) {
+        const double share = 1.0 / (k + 1);
+        sklyanin_gyrostat_EACH_LANE
+        for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) e->s[i][k + 1][lane] = share * e->s[field[i]][k][lane];
+    }
+}
+
+/* Begin to expand the paths with the middles m. */
+static void sklyanin_gyrostat_begin(sklyanin_gyrostat_lanes coef[restrict], sklyanin_gyrostat_expansion *e, sklyanin_gyrostat_lanes m[restrict 4])
+{
+    sklyanin_gyrostat_lanes norm = { 0.0 };
+    sklyanin_gyrostat_values_lanes(coef, e->p, m, e->value, e->fixed);
+    for (int i = 0; i < 40; ++i) memcpy(e->s[i][0], e->value[i], sizeof e->value[i]);
+    memset(e->even, 0, sizeof e->even);
+    memset(e->odd, 0, sizeof e->odd);
+    memset(e->mean, 0, sizeof e->mean);
+    sklyanin_gyrostat_next_order(coef, e, 0);
+    e->terms = 0;
+    for (int i = 0; i < 4; ++i) {
+        sklyanin_gyrostat_EACH_LANE
+        for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) {
+            e->unit[i][lane] = fabs(m[i][lane]) + fabs(e->s[i][1][lane]) + DBL_MIN;
+            norm[lane] += e->unit[i][lane];
+        }
+    }
+    for (int i = 0; i < 4; ++i)
+        for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) e->unit[i][lane] = 1.0 / (e->unit[i][lane] + 1e-5 * norm[lane]);
+}
+
+/* Add the terms of the odd order k and of the next. */
+static void sklyanin_gyrostat_add_terms(sklyanin_gyrostat_expansion *e, int k, sklyanin_gyrostat_lanes size)
+{
+    const double share = 1.0 / (k + 2);
+    memset(size, 0, sklyanin_gyrostat_LANES * sizeof size[0]);
+    for (int i = 0; i < 4; ++i) {
+        sklyanin_gyrostat_EACH_LANE
+        for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) {
+            const double odd = e->s[i][k][lane], even = e->s[i][k + 1][lane];
+            e->odd[i][lane] += odd;
+            e->even[i][lane] += even;
+            e->mean[i][lane] += share * even;
+            size[lane] += (fabs(odd) + fabs(even)) * e->unit[i][lane];
+        }
+    }
+}
+
+/* Go on by two orders at a time, until these are below accuracy in all lanes that are finite. Where 16 terms do not
+   suffice, the path is too long to be followed here: infinite. */
+static void sklyanin_gyrostat_extend(sklyanin_gyrostat_lanes coef[restrict], sklyanin_gyrostat_expansion *e, double accuracy)
+{
+    sklyanin_gyrostat_lanes size;
+    double largest = HUGE_VAL;
+    for (; e->terms < 16 && largest > accuracy; e->terms += 2) {
+        if (e->terms > 0) sklyanin_gyrostat_next_order(coef, e, e->terms);
+        sklyanin_gyrostat_next_order(coef, e, e->terms + 1);
+        sklyanin_gyrostat_add_terms(e, e->terms + 1, size);
+        largest = sklyanin_gyrostat_largest_finite(size);
+    }
+    for (int lane = 0; lane < sklyanin_gyrostat_LANES && largest > accuracy; ++lane)
+        if (size[lane] > accuracy) e->mean[0][lane] = HUGE_VAL;
+}
+
+/* sklyanin_gyrostat_holds at one end of the paths, time 1 or -1, in all lanes: infinite where the equation does not hold. */
+static void sklyanin_gyrostat_check_end(sklyanin_gyrostat_lanes coef[restrict], sklyanin_gyrostat_expansion *e, double time,
+    sklyanin_gyrostat_lanes wrong)
+{
+    static const int field[4] = { 13, 23, 32, 39 };
+    sklyanin_gyrostat_lanes m[4], slope[4], value[40], fixed[1], scale = { 0.0 };
+    memset(slope, 0, sizeof slope);
+    for (int i = 0; i < 4; ++i) {
+        double power = 1.0;
+        for (int k = 1; k <= e->terms; ++k, power *= time) {
+            sklyanin_gyrostat_EACH_LANE
+            for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) slope[i][lane] += k * power * e->s[i][k][lane];
+        }
+        sklyanin_gyrostat_EACH_LANE
+        for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) {
+            m[i][lane] = e->s[i][0][lane] + (e->even[i][lane] + time * e->odd[i][lane]);
+            scale[lane] += fabs(m[i][lane]) + fabs(slope[i][lane]);
+        }
+    }
+    sklyanin_gyrostat_values_lanes(coef, e->p, m, value, fixed);
+    for (int i = 0; i < 4; ++i)
+        for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) {
+            const double off = fabs(value[field[i]][lane] - slope[i][lane]);
+            wrong[lane] += off <= 2e-15 * scale[lane] ? 0.0 : HUGE_VAL;
+        }
+}
+
+/* Begin to expand the paths with mean y, from their middles as far as these are known. */
+static void sklyanin_gyrostat_begin_at(sklyanin_gyrostat_lanes coef[restrict], const sklyanin_gyrostat_model *model, sklyanin_gyrostat_expansion *e)
+{
+    sklyanin_gyrostat_lanes m[4];
+    for (int i = 0; i < 4; ++i)
+        for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) m[i][lane] = model->y[i][lane] + model->middle[i][lane];
+    sklyanin_gyrostat_begin(coef, e, m);
+}
+
+/* Find the middles by iteration, which gains some digits each time, with expansions as short as that allows; the last
+   can be gone on with. Infinite where that does not converge. */
+static void sklyanin_gyrostat_settle(sklyanin_gyrostat_lanes coef[restrict], sklyanin_gyrostat_model *model, sklyanin_gyrostat_expansion *e)
+{
+    sklyanin_gyrostat_lanes size, norm;
+    double left = 1.0;
+    memset(model->middle, 0, sizeof model->middle);
+    for (int round = 0; left > 1e-9 && round < 12; ++round) {
+        for (int i = 0; i < 4 && round > 0; ++i)
+            for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) model->middle[i][lane] = -e->mean[i][lane];
+        sklyanin_gyrostat_begin_at(coef, model, e);
+        sklyanin_gyrostat_extend(coef, e, 1e-4 * left);
+        for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) size[lane] = 0.0, norm[lane] = DBL_MIN;
+        for (int i = 0; i < 4; ++i) {
+            sklyanin_gyrostat_EACH_LANE
+            for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) {
+                size[lane] += fabs(model->middle[i][lane] + e->mean[i][lane]);
+                norm[lane] += fabs(model->y[i][lane]);
+            }
+        }
+        for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) size[lane] /= norm[lane];
+        left = sklyanin_gyrostat_largest_finite(size);
+        if (left > 1.0) left = 1.0;
+    }
+    for (int lane = 0; lane < sklyanin_gyrostat_LANES && left > 1e-9; ++lane)
+        if (size[lane] > 1e-9) model->middle[0][lane] = HUGE_VAL;
+}
+
+/* Half of p: paths take the time from -1 to 1. */
+static void sklyanin_gyrostat_halve(sklyanin_gyrostat_lanes p[restrict 4])
+{
+    for (int i = 0; i < 4; ++i)
+        for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) p[i][lane] *= 0.5;
+}
+
+/* alpha - y and beta - alpha to leading order, from one short expansion. */
+static void sklyanin_gyrostat_evaluate_lanes(sklyanin_gyrostat_lanes coef[restrict], sklyanin_gyrostat_lanes y[restrict 4],
+    sklyanin_gyrostat_lanes displacement[restrict 4], sklyanin_gyrostat_lanes increment[restrict 4])
+{
+    sklyanin_gyrostat_expansion e;
+    sklyanin_gyrostat_momentum_lanes(coef, y, e.p);
+    sklyanin_gyrostat_halve(e.p);
+    sklyanin_gyrostat_begin(coef, &e, y);
+    sklyanin_gyrostat_extend(coef, &e, 1e-6);
+    for (int i = 0; i < 4; ++i)
+        for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) {
+            displacement[i][lane] = (e.even[i][lane] - e.odd[i][lane]) - e.mean[i][lane];
+            increment[i][lane] = 2.0 * e.odd[i][lane];
+        }
+}
+
+/* What order j of d(pi p)/dm contributes to order k + 1 of the derivatives. */
+static void sklyanin_gyrostat_vary_by(sklyanin_gyrostat_expansion *e, int j, int k)
+{
+    sklyanin_gyrostat_lanes *from = e->v[k - j], *to = e->v[k + 1];
+    sklyanin_gyrostat_EACH_LANE
+    for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) {
+        const double a01 = e->slope[3][j][lane];
+        const double a02 = e->slope[7][j][lane];
+        const double a03 = e->slope[12][j][lane];
+        const double a10 = e->slope[15][j][lane];
+        const double a12 = e->slope[20][j][lane];
+        const double a13 = e->slope[25][j][lane];
+        const double a20 = e->slope[28][j][lane];
+        const double a21 = e->slope[30][j][lane];
+        const double a23 = e->slope[35][j][lane];
+        const double a30 = e->slope[37][j][lane];
+        const double a31 = e->slope[38][j][lane];
+        const double a32 = e->slope[39][j][lane];
+        to[0][lane] += a01 * from[8][lane] + a02 * from[16][lane] + a03 * from[24][lane];
+        to[1][lane] += a01 * from[9][lane] + a02 * from[17][lane] + a03 * from[25][lane];
+        to[2][lane] += a01 * from[10][lane] + a02 * from[18][lane] + a03 * from[26][lane];
+        to[3][lane] += a01 * from[11][lane] + a02 * from[19][lane] + a03 * from[27][lane];
+        to[4][lane] += a01 * from[12][lane] + a02 * from[20][lane] + a03 * from[28][lane];
+        to[5][lane] += a01 * from[13][lane] + a02 * from[21][lane] + a03 * from[29][lane];
+        to[6][lane] += a01 * from[14][lane] + a02 * from[22][lane] + a03 * from[30][lane];
+        to[7][lane] += a01 * from[15][lane] + a02 * from[23][lane] + a03 * from[31][lane];
+        to[8][lane] += a10 * from[0][lane] + a12 * from[16][lane] + a13 * from[24][lane];
+        to[9][lane] += a10 * from[1][lane] + a12 * from[17][lane] + a13 * from[25][lane];
+        to[10][lane] += a10 * from[2][lane] + a12 * from[18][lane] + a13 * from[26][lane];
+        to[11][lane] += a10 * from[3][lane] + a12 * from[19][lane] + a13 * from[27][lane];
+        to[12][lane] += a10 * from[4][lane] + a12 * from[20][lane] + a13 * from[28][lane];
+        to[13][lane] += a10 * from[5][lane] + a12 * from[21][lane] + a13 * from[29][lane];
+        to[14][lane] += a10 * from[6][lane] + a12 * from[22][lane] + a13 * from[30][lane];
+        to[15][lane] += a10 * from[7][lane] + a12 * from[23][lane] + a13 * from[31][lane];
+        to[16][lane] += a20 * from[0][lane] + a21 * from[8][lane] + a23 * from[24][lane];
+        to[17][lane] += a20 * from[1][lane] + a21 * from[9][lane] + a23 * from[25][lane];
+        to[18][lane] += a20 * from[2][lane] + a21 * from[10][lane] + a23 * from[26][lane];
+        to[19][lane] += a20 * from[3][lane] + a21 * from[11][lane] + a23 * from[27][lane];
+        to[20][lane] += a20 * from[4][lane] + a21 * from[12][lane] + a23 * from[28][lane];
+        to[21][lane] += a20 * from[5][lane] + a21 * from[13][lane] + a23 * from[29][lane];
+        to[22][lane] += a20 * from[6][lane] + a21 * from[14][lane] + a23 * from[30][lane];
+        to[23][lane] += a20 * from[7][lane] + a21 * from[15][lane] + a23 * from[31][lane];
+        to[24][lane] += a30 * from[0][lane] + a31 * from[8][lane] + a32 * from[16][lane];
+        to[25][lane] += a30 * from[1][lane] + a31 * from[9][lane] + a32 * from[17][lane];
+        to[26][lane] += a30 * from[2][lane] + a31 * from[10][lane] + a32 * from[18][lane];
+        to[27][lane] += a30 * from[3][lane] + a31 * from[11][lane] + a32 * from[19][lane];
+        to[28][lane] += a30 * from[4][lane] + a31 * from[12][lane] + a32 * from[20][lane];
+        to[29][lane] += a30 * from[5][lane] + a31 * from[13][lane] + a32 * from[21][lane];
+        to[30][lane] += a30 * from[6][lane] + a31 * from[14][lane] + a32 * from[22][lane];
+        to[31][lane] += a30 * from[7][lane] + a31 * from[15][lane] + a32 * from[23][lane];
+    }
+}
+
+/* Order k + 1 of the derivatives; order 0 is 1 along the middle, and 0 along p. */
+static void sklyanin_gyrostat_vary_order(sklyanin_gyrostat_expansion *e, int k)
+{
+    sklyanin_gyrostat_lanes *to = e->v[k + 1];
+    memset(to, 0, 32 * sizeof to[0]);
+    sklyanin_gyrostat_EACH_LANE
+    for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) {
+        to[1][lane] += e->slope[3][k][lane];
+        to[2][lane] += e->slope[7][k][lane];
+        to[3][lane] += e->slope[12][k][lane];
+        to[8][lane] += e->slope[15][k][lane];
+        to[10][lane] += e->slope[20][k][lane];
+        to[11][lane] += e->slope[25][k][lane];
+        to[16][lane] += e->slope[28][k][lane];
+        to[17][lane] += e->slope[30][k][lane];
+        to[19][lane] += e->slope[35][k][lane];
+        to[24][lane] += e->slope[37][k][lane];
+        to[25][lane] += e->slope[38][k][lane];
+        to[26][lane] += e->slope[39][k][lane];
+        to[5][lane] += 0.5 * e->slope[40][k][lane];
+        to[6][lane] += 0.5 * e->slope[41][k][lane];
+        to[7][lane] += 0.5 * e->slope[42][k][lane];
+        to[12][lane] += 0.5 * e->slope[43][k][lane];
+        to[14][lane] += 0.5 * e->slope[44][k][lane];
+        to[15][lane] += 0.5 * e->slope[45][k][lane];
+        to[20][lane] += 0.5 * e->slope[46][k][lane];
+        to[21][lane] += 0.5 * e->slope[47][k][lane];
+        to[23][lane] += 0.5 * e->slope[48][k][lane];
+        to[28][lane] += 0.5 * e->s[11][k][lane];
+        to[29][lane] += 0.5 * e->slope[49][k][lane];
+        to[30][lane] += 0.5 * e->slope[50][k][lane];
+    }
+    for (int j = 0; j < k; ++j) sklyanin_gyrostat_vary_by(e, j, k);
+    for (int i = 0; i < 32; ++i) {
+        const double share = 1.0 / (k + 1);
+        sklyanin_gyrostat_EACH_LANE
+        for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) to[i][lane] *= share;
+    }
+}
+
+/* Add the terms of the odd order k of the derivatives and of the next, and measure them: those along the middle beside 1,
+   those along p beside their first. */
+static void sklyanin_gyrostat_add_slopes(sklyanin_gyrostat_expansion *e, int k, sklyanin_gyrostat_lanes size)
+{
+    sklyanin_gyrostat_lanes parts[2] = { { 0.0 } }, first = { 0.0 };
+    const double share = 1.0 / (k + 2);
+    for (int i = 0; i < 32; ++i) {
+        const int part = i % 8 / 4;
+        sklyanin_gyrostat_EACH_LANE
+        for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) {
+            const double odd = e->v[k][i][lane], even = e->v[k + 1][i][lane];
+            e->v_odd[i][lane] += odd;
+            e->v_even[i][lane] += even;
+            e->v_mean[i][lane] += share * even;
+            parts[part][lane] += fabs(odd) + fabs(even);
+            first[lane] += fabs(e->v[1][i][lane]);
+        }
+    }
+    for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane)
+        size[lane] = parts[0][lane] + parts[1][lane] / (first[lane] + DBL_MIN);
+}
+
+/* The derivatives of the paths along their middles and p, to seven digits: what that leaves of a correction is below
+   rounding when it is accepted. Infinite where 12 terms do not suffice. */
+static void sklyanin_gyrostat_vary(sklyanin_gyrostat_lanes coef[restrict], sklyanin_gyrostat_expansion *e)
+{
+    sklyanin_gyrostat_lanes slope[51], size;
+    double largest = HUGE_VAL;
+    sklyanin_gyrostat_slope_values_lanes(coef, e->p, e->value, e->fixed, slope, e->slope_fixed);
+    for (int i = 0; i < 51; ++i) memcpy(e->slope[i][0], slope[i], sizeof slope[i]);
+    memset(e->v_even, 0, sizeof e->v_even);
+    memset(e->v_odd, 0, sizeof e->v_odd);
+    memset(e->v_mean, 0, sizeof e->v_mean);
+    for (int i = 0; i < 4; ++i)
+        for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane)
+            e->v_even[i * 8 + i][lane] = e->v_mean[i * 8 + i][lane] = 1.0;
+    for (int k = 0; k < 12 && largest > 1e-07; ++k) {
+        if (k >= e->terms) sklyanin_gyrostat_next_order(coef, e, k);
+        if (k > 0) sklyanin_gyrostat_follow_slopes(coef, e, k);
+        sklyanin_gyrostat_vary_order(e, k);
+        if (k % 2 == 0) continue;
+        sklyanin_gyrostat_add_slopes(e, k, size);
+        largest = sklyanin_gyrostat_largest_finite(size);
+    }
+    for (int lane = 0; lane < sklyanin_gyrostat_LANES && largest > 1e-07; ++lane)
+        if (size[lane] > 1e-07) e->v_mean[0][lane] = HUGE_VAL;
+}
+
+/* Put the middles of the paths where they are, to first order, after y was corrected. */
+static void sklyanin_gyrostat_sway(sklyanin_gyrostat_model *model)
+{
+    for (int i = 0; i < 4; ++i)
+        for (int j = 0; j < 4; ++j) {
+            sklyanin_gyrostat_EACH_LANE
+            for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane)
+                model->middle[i][lane] += model->sway[i * 4 + j][lane] * (model->y[j][lane] - model->at[j][lane]);
+        }
+}
+
+/* alpha - y and beta - alpha from an expansion whose mean misses y by little, to first order in that. */
+static void sklyanin_gyrostat_read_ends(sklyanin_gyrostat_model *model, sklyanin_gyrostat_expansion *e, const sklyanin_gyrostat_lanes wrong)
+{
+    sklyanin_gyrostat_lanes miss[4];
+    for (int i = 0; i < 4; ++i) {
+        sklyanin_gyrostat_EACH_LANE
+        for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) {
+            miss[i][lane] = model->middle[i][lane] + e->mean[i][lane];
+            model->displacement[i][lane] = ((model->middle[i][lane] + e->even[i][lane]) - e->odd[i][lane]) + wrong[lane];
+            model->increment[i][lane] = 2.0 * e->odd[i][lane];
+            model->middle[i][lane] = -e->mean[i][lane];
+            model->at[i][lane] = model->y[i][lane];
+        }
+    }
+    for (int i = 0; i < 4; ++i)
+        for (int j = 0; j < 4; ++j) {
+            sklyanin_gyrostat_EACH_LANE
+            for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) {
+                model->displacement[i][lane] -= model->alpha_y[i * 4 + j][lane] * miss[j][lane];
+                model->increment[i][lane] -= model->increment_y[i * 4 + j][lane] * miss[j][lane];
+            }
+        }
+}
+
+/* The matrices of a stage, from the derivatives of the paths and the Hessian of S_h. */
+static void sklyanin_gyrostat_linearise_paths(sklyanin_gyrostat_lanes coef[restrict], sklyanin_gyrostat_model *model, sklyanin_gyrostat_expansion *e,
+    sklyanin_gyrostat_lanes hessian[restrict 16])
+{
+    sklyanin_gyrostat_lanes jacobian[16], reciprocal[2 * 4];
+    sklyanin_gyrostat_vary(coef, e);
+    sklyanin_gyrostat_along_mean_lanes(e->v_even, e->v_odd, e->v_mean, hessian, model->alpha_y, model->increment_y, jacobian,
+        model->slope, model->sway, reciprocal);
+    sklyanin_gyrostat_invert_lanes(jacobian, model->slope, model->inverse, model->gain, reciprocal + 4);
+    for (int i = 0; i < 2 * 4; ++i) {
+        sklyanin_gyrostat_EACH_LANE
+        for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane)
+            model->inverse[i % 4][lane] += fabs(reciprocal[i][lane]) < 1e3 ? 0.0 : HUGE_VAL;
+    }
+}
+
+/* The table of a stage, with its matrices or with those of the last pass. */
+static void sklyanin_gyrostat_update(sklyanin_gyrostat_lanes coef[restrict], sklyanin_gyrostat_model *model, int matrices)
+{
+    sklyanin_gyrostat_expansion e;
+    sklyanin_gyrostat_lanes hessian[16], wrong = { 0.0 };
+    if (matrices) sklyanin_gyrostat_curvature_lanes(coef, model->y, e.p, hessian);
+    else sklyanin_gyrostat_momentum_lanes(coef, model->y, e.p);
+    sklyanin_gyrostat_halve(e.p);
+    if (matrices) {
+        sklyanin_gyrostat_settle(coef, model, &e);
+    } else {
+        sklyanin_gyrostat_sway(model);
+        sklyanin_gyrostat_begin_at(coef, model, &e);
+    }
+    sklyanin_gyrostat_extend(coef, &e, 1e-17);
+    sklyanin_gyrostat_check_end(coef, &e, 1.0, wrong);
+    sklyanin_gyrostat_check_end(coef, &e, -1.0, wrong);
+    if (matrices) sklyanin_gyrostat_linearise_paths(coef, model, &e, hessian);
+    sklyanin_gyrostat_read_ends(model, &e, wrong);
+}
+
+/* The steps of a block one after the other, each along the linear model of its lane. As X, the state with its carry, gains
+   increment - gain residual, the next residual follows from this one; X itself is added up apart. */
+static void sklyanin_gyrostat_chain(sklyanin_gyrostat_model model[1], double x[4], double carry[4])
+{
+    double residual[4], sum[4], small[4];
+    for (int i = 0; i < 4; ++i) {
+        residual[i] = ((model->y[i][0] - x[i]) + model->displacement[i][0]) - carry[i];
+        sum[i] = x[i];
+        small[i] = carry[i];
+    }
+    for (int k = 0; k < 1 * sklyanin_gyrostat_LANES; ++k) {
+        const int lane = k / 1, after = (k + 1) / 1 % sklyanin_gyrostat_LANES;
+        sklyanin_gyrostat_model *at = &model[k % 1], *next = &model[(k + 1) % 1];
+        double even[4] = { 0.0 }, odd[4] = { 0.0 }; /* two sums, so that no long chain of additions is waited for */
+        for (int i = 0; i < 4; ++i) {
+            at->residual[i][lane] = residual[i];
+            for (int j = 0; j < 4; j += 2) even[i] += at->gain[i * 4 + j][lane] * residual[j];
+            for (int j = 1; j < 4; j += 2) odd[i] += at->gain[i * 4 + j][lane] * residual[j];
+        }
+        for (int i = 0; i < 4; ++i) {
+            const double change = at->increment[i][lane], total = sum[i] + change, added = total - sum[i];
+            const double turn = (next->displacement[i][after] - at->displacement[i][lane]) - change;
+            const double moved = (next->y[i][after] - at->y[i][lane]) + turn;
+            residual[i] = ((moved + residual[i]) + odd[i]) + even[i];
+            small[i] += ((sum[i] - (total - added)) + (change - added)) - (even[i] + odd[i]);
+            sum[i] = total;
+        }
+    }
+    for (int i = 0; i < 4; ++i) {
+        x[i] = sum[i] + small[i];
+        carry[i] = small[i] - (x[i] - sum[i]);
+    }
+}
+
+/* Bring the table up to date: coefficients, and weights that were fitted since. */
+static void sklyanin_gyrostat_refresh(const sklyanin_gyrostat_solver *s, sklyanin_gyrostat_table *table)
+{
+    for (int stage = 0; stage < 1; ++stage) {
+        if (table->fits[stage] == s->memory[stage].fits) continue;
+        table->fits[stage] = s->memory[stage].fits;
+        for (int k = 0; k < 31; ++k)
+            for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) table->coef[stage][k][lane] = s->coef[stage][k];
+        memcpy(table->weight[stage], s->memory[stage].weight, (size_t)s->memory[stage].terms * sizeof table->weight[0][0]);
+    }
+}
+
+/* Guesses for the next sklyanin_gyrostat_LANES values of a stage, by its recurrences. */
+static void sklyanin_gyrostat_foresee(const sklyanin_gyrostat_memory *memory, sklyanin_gyrostat_lanes weight[restrict][4],
+    sklyanin_gyrostat_lanes y[restrict 4])
+{
+    const int last = memory->count - 1;
+    for (int i = 0; i < 4; ++i) {
+        sklyanin_gyrostat_lanes even = { 0.0 }, odd = { 0.0 };
+        for (int k = 0; k < memory->terms; k += 2) {
+            const double past = memory->past[last - k][i], earlier = memory->past[last - 1 - k][i];
+            sklyanin_gyrostat_EACH_LANE
+            for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) even[lane] += weight[k][i][lane] * past;
+            sklyanin_gyrostat_EACH_LANE
+            for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) odd[lane] += weight[k + 1][i][lane] * earlier;
+        }
+        sklyanin_gyrostat_EACH_LANE
+        for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) y[i][lane] = even[lane] + odd[lane];
+    }
+}
+
+/* sklyanin_gyrostat_record for the values of all lanes, one after the other. */
+static void sklyanin_gyrostat_record_lanes(sklyanin_gyrostat_memory *memory, sklyanin_gyrostat_lanes y[restrict 4])
+{
+    sklyanin_gyrostat_make_room(memory, sklyanin_gyrostat_LANES);
+    for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane)
+        for (int i = 0; i < 4; ++i) memory->past[memory->count + lane][i] = y[i][lane];
+    memory->count += sklyanin_gyrostat_LANES;
+}
+
+/* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
+   method, to leading order. */
+static void sklyanin_gyrostat_march(const sklyanin_gyrostat_solver *s, sklyanin_gyrostat_table *table, sklyanin_gyrostat_model model[1])
+{
+    static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
+    double x[4], point[4], slope[4], mean[4];
+    memcpy(x, s->x, sizeof x);
+    for (int k = 0; k < 1 * sklyanin_gyrostat_LANES; ++k) {
+        const double h = sklyanin_gyrostat_fractions[k % 1] * s->h;
+        memcpy(point, x, sizeof x);
+        memset(mean, 0, sizeof mean);
+        for (int part = 0; part < 4; ++part) {
+            sklyanin_gyrostat_vector_field(&s->params, point, slope);
+            for (int i = 0; i < 4; ++i) {
+                mean[i] += weight[part] * slope[i];
+                point[i] = x[i] + h * reach[part] * slope[i];
+            }
+        }
+        for (int i = 0; i < 4; ++i) {
+            model[k % 1].y[i][k / 1] = x[i] + 0.5 * h * mean[i];
+            x[i] += h * mean[i];
+        }
+    }
+    for (int stage = 0; stage < 1; ++stage) {
+        sklyanin_gyrostat_model *at = &model[stage];
+        sklyanin_gyrostat_evaluate_lanes(table->coef[stage], at->y, at->displacement, at->increment);
+        for (int i = 0; i < 4; ++i) {
+            sklyanin_gyrostat_EACH_LANE
+            for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane)
+                at->y[i][lane] -= at->displacement[i][lane] + 0.5 * at->increment[i][lane];
+        }
+    }
+}
+
+/* sklyanin_gyrostat_LANES steps at once: guess the points of all, and correct them together until the error that remains is as
+   small as after a single step. How many passes that took; 0, and the solver as before, where it takes more than most. */
+static int sklyanin_gyrostat_block(sklyanin_gyrostat_solver *s, sklyanin_gyrostat_table *table, int most)
+{
+    sklyanin_gyrostat_model model[1];
+    sklyanin_gyrostat_lanes sizes;
+    double x[4], carry[4], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
+    int passes = 0, solved = 0;
+    if (!s->foreseeing) sklyanin_gyrostat_march(s, table, model);
+    for (int stage = 0; stage < 1; ++stage) {
+        if (s->foreseeing) sklyanin_gyrostat_foresee(&s->memory[stage], table->weight[stage], model[stage].y);
+        if (!sklyanin_gyrostat_near_lanes(model[stage].y, s->x)) return 0;
+    }
+    while (!solved) {
+        double size = 0.0;
+        const int matrices = previous > 1e-05;
+        for (int stage = 0; stage < 1; ++stage) sklyanin_gyrostat_update(table->coef[stage], &model[stage], matrices);
+        memcpy(x, s->x, sizeof x);
+        memcpy(carry, s->carry, sizeof carry);
+        sklyanin_gyrostat_chain(model, x, carry);
+        for (int stage = 0; stage < 1; ++stage) {
+            sklyanin_gyrostat_correct(&model[stage], sizes);
+            const double largest = sklyanin_gyrostat_largest(sizes);
+            size = largest > size ? largest : size;
+        }
+        s->evaluations += 1 * sklyanin_gyrostat_LANES;
+        bend = matrices ? 0.0 : bend + previous;
+        bound = sklyanin_gyrostat_remaining(size, bend, bound);
+        /* The second test: after the square of so small a correction there is rounding only. */
+        solved = bound <= 1e-20 || (previous < 1e-8 && size < 1e-10);
+        if ((++passes >= most || !(size < previous)) && !solved) return 0;
+        previous = size;
+    }
+    for (int i = 0; i < 4; ++i)
+        if (!isfinite(x[i])) return 0;
+    memcpy(s->x, x, sizeof x);
+    memcpy(s->carry, carry, sizeof carry);
+    s->steps += sklyanin_gyrostat_LANES;
+    for (int stage = 0; stage < 1; ++stage) {
+        sklyanin_gyrostat_memory *memory = &s->memory[stage];
+        sklyanin_gyrostat_record_lanes(memory, model[stage].y);
+        memory->slow = passes > 1 ? memory->slow + sklyanin_gyrostat_LANES : 0;
+        if (memory->slow > memory->patience && s->foreseeing) sklyanin_gyrostat_fit(memory);
+    }
+    return passes;
+}
+
+/* How the next block is guessed: by recurrences, fitted as soon as enough steps are to be made, or
+   have been, to repay that. */
+static void sklyanin_gyrostat_choose_guess(sklyanin_gyrostat_solver *s, size_t steps)
+{
+    for (int stage = 0; stage < 1; ++stage)
+        if (s->memory[stage].count < 95) {
+            s->foreseeing = 0;
+            return;
+        }
+    if (s->foreseeing || (steps < 600 && s->steps < 150) || s->steps < s->retry) return;
+    for (int stage = 0; stage < 1; ++stage) sklyanin_gyrostat_fit(&s->memory[stage]);
+    s->foreseeing = 1;
+    s->pause = sklyanin_gyrostat_LANES;
+}
+
+/* Learn from a block: after one that failed single steps are made, the more the more often that happens. Recurrences
+   that fail repeatedly, or need more passes than steps by Runge-Kutta did, are given up for a while. */
+static void sklyanin_gyrostat_learn_from(sklyanin_gyrostat_solver *s, int passes)
+{
+    if (passes > 0) {
+        s->setback /= 2;
+    } else {
+        s->setback = 2 * s->setback + sklyanin_gyrostat_LANES > 1000 ? 1000 : 2 * s->setback + sklyanin_gyrostat_LANES;
+        s->pause = s->setback;
+    }
+    if (!s->foreseeing) {
+        s->passes = passes > 0 ? passes : INT_MAX;
+    } else if (passes > s->passes || s->setback > 5 * sklyanin_gyrostat_LANES) {
+        s->foreseeing = s->setback = s->pause = 0;
+        s->doubt = 2 * s->doubt + 600;
+        s->retry = s->steps + s->doubt;
+    }
+}
+
+/* A single step, and the running mean of the evaluations that a stage of one takes. */
+static sklyanin_gyrostat_status sklyanin_gyrostat_single(sklyanin_gyrostat_solver *s)
+{
+    const size_t before = s->evaluations;
+    const sklyanin_gyrostat_status status = sklyanin_gyrostat_step(s, s->h);
+    s->effort += 0.125 * ((double)(s->evaluations - before) / 1 - s->effort);
+    return status;
+}
+
+/* Blocks of steps where they cost less than single steps, with at most as many passes over a block as 1 for each
+   evaluation in a single step. The results differ by round-off only. */
 sklyanin_gyrostat_status sklyanin_gyrostat_integrate(sklyanin_gyrostat_solver *s, double h, size_t steps)
 {
-    for (size_t k = 0; k < steps; ++k) {
-        const sklyanin_gyrostat_status status = sklyanin_gyrostat_step(s, h);
-        if (status != sklyanin_gyrostat_OK) return status;
+    sklyanin_gyrostat_table table;
+    sklyanin_gyrostat_status status = sklyanin_gyrostat_set_step(s, h);
+    for (int stage = 0; stage < 1; ++stage) table.fits[stage] = -1;
+    while (status == sklyanin_gyrostat_OK && steps > 0) {
+        if (steps >= sklyanin_gyrostat_LANES && s->pause == 0) sklyanin_gyrostat_choose_guess(s, steps);
+        if (steps >= sklyanin_gyrostat_LANES && s->pause == 0) {
+            sklyanin_gyrostat_refresh(s, &table);
+            const int passes = sklyanin_gyrostat_block(s, &table, (int)(1 * s->effort + 0.5));
+            sklyanin_gyrostat_learn_from(s, passes);
+            if (passes > 0) steps -= sklyanin_gyrostat_LANES;
+        } else {
+            if (s->pause > 0) --s->pause;
+            status = sklyanin_gyrostat_single(s);
+            if (status == sklyanin_gyrostat_OK) --steps;
+        }
     }
-    return sklyanin_gyrostat_OK;
+    return status;
+}
+
+/* Members of an ensemble, each in its lane. */
+typedef struct {
+    sklyanin_gyrostat_lanes x[4], carry[4], coef[1][31];
+    sklyanin_gyrostat_lanes past[1][95][4]; /* solved values, in a ring */
+    sklyanin_gyrostat_lanes weight[1][32][4]; /* of past values, the latest first, for the next */
+    int latest;     /* the row of the latest values */
+    int count;      /* rows in use */
+    int order[1];   /* how many of them the extrapolation uses */
+    int terms[1];   /* how many of them the recurrences use */
+    int fits;       /* how often recurrences have been fitted */
+    int fitting[1]; /* whether they are the better guess */
+    int slow;       /* how many of the last steps took more than one iteration */
+    int patience;   /* how many of those before recurrences are fitted again */
+    int active[8];  /* whether the lane has a member that has not failed */
+    size_t left[8]; /* steps that it has still to make */
+    double gauge[8][1]; /* of each member */
+} sklyanin_gyrostat_group;
+
+/* The past values of a stage, the latest for k = 0. */
+static sklyanin_gyrostat_lanes *sklyanin_gyrostat_group_past(sklyanin_gyrostat_group *group, int stage, int k)
+{
+    return group->past[stage][(group->latest + k) % 95];
+}
+
+/* Guess the values of a stage by the recurrences of the members. */
+static void sklyanin_gyrostat_group_foresee(sklyanin_gyrostat_group *group, int stage, sklyanin_gyrostat_lanes y[restrict 4])
+{
+    memset(y, 0, 4 * sizeof y[0]);
+    for (int k = 0; k < group->terms[stage]; ++k) {
+        sklyanin_gyrostat_lanes *past = sklyanin_gyrostat_group_past(group, stage, k), *weight = group->weight[stage][k];
+        for (int i = 0; i < 4; ++i) {
+            sklyanin_gyrostat_EACH_LANE
+            for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) y[i][lane] += weight[i][lane] * past[i][lane];
+        }
+    }
+}
+
+/* Extrapolate the values of a stage. */
+static void sklyanin_gyrostat_group_extrapolate(sklyanin_gyrostat_group *group, int stage, sklyanin_gyrostat_lanes y[restrict 4])
+{
+    const int order = group->order[stage];
+    double binomial = -1.0;
+    memcpy(y, group->x, 4 * sizeof y[0]);
+    if (order > 0) memset(y, 0, 4 * sizeof y[0]);
+    for (int k = 0; k < order; ++k) {
+        sklyanin_gyrostat_lanes *past = sklyanin_gyrostat_group_past(group, stage, k);
+        binomial *= -(double)(order - k) / (k + 1);
+        for (int i = 0; i < 4; ++i) {
+            sklyanin_gyrostat_EACH_LANE
+            for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) y[i][lane] += binomial * past[i][lane];
+        }
+    }
+}
+
+/* The sum over members of the absolute values of all components. */
+static double sklyanin_gyrostat_group_sum(const sklyanin_gyrostat_group *group, sklyanin_gyrostat_lanes y[4])
+{
+    double sum = 0.0;
+    for (int i = 0; i < 4; ++i)
+        for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) sum += group->active[lane] ? fabs(y[i][lane]) : 0.0;
+    return sum;
+}
+
+static void sklyanin_gyrostat_group_subtract(sklyanin_gyrostat_lanes y[restrict 4], sklyanin_gyrostat_lanes other[restrict 4])
+{
+    for (int i = 0; i < 4; ++i) {
+        sklyanin_gyrostat_EACH_LANE
+        for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) y[i][lane] -= other[i][lane];
+    }
+}
+
+/* Choose the guess that would have been best for these values. */
+static void sklyanin_gyrostat_group_judge(sklyanin_gyrostat_group *group, int stage, sklyanin_gyrostat_lanes y[4])
+{
+    sklyanin_gyrostat_lanes row[8 + 1][4];
+    const int rows = group->count < 8 ? group->count : 8;
+    double least = HUGE_VAL;
+    memcpy(row[0], y, sizeof row[0]);
+    for (int k = 0; k < rows; ++k) memcpy(row[k + 1], sklyanin_gyrostat_group_past(group, stage, k), sizeof row[0]);
+    if (group->order[stage] == 0) group->order[stage] = 1;
+    for (int order = 1; order <= rows; ++order) { /* row[0] becomes the backward difference of this order */
+        for (int k = 0; k <= rows - order; ++k) sklyanin_gyrostat_group_subtract(row[k], row[k + 1]);
+        const double size = sklyanin_gyrostat_group_sum(group, row[0]);
+        if (size < least) {
+            least = size;
+            group->order[stage] = order;
+        }
+    }
+    if (group->fits == 0) return;
+    sklyanin_gyrostat_group_foresee(group, stage, row[0]);
+    sklyanin_gyrostat_group_subtract(row[0], y);
+    group->fitting[stage] = sklyanin_gyrostat_group_sum(group, row[0]) <= least;
+}
+
+/* Fit the recurrences of all members; with every time, wait longer before it is done again, and for long if it did not
+   help. */
+static void sklyanin_gyrostat_group_fit(sklyanin_gyrostat_group *group)
+{
+    sklyanin_gyrostat_memory memory;
+    const int helped = group->fits == 0 || group->fitting[0];
+    memory.count = 95;
+    for (int stage = 0; stage < 1; ++stage) {
+        group->terms[stage] = 0;
+        for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane)
+            for (int i = 0; i < 4 && group->active[lane]; ++i) {
+                for (int k = 0; k < 95; ++k)
+                    memory.past[95 - 1 - k][i] = sklyanin_gyrostat_group_past(group, stage, k)[i][lane];
+                const int terms = sklyanin_gyrostat_train(&memory, i);
+                if (terms > group->terms[stage]) group->terms[stage] = terms;
+                for (int k = 0; k < 32; ++k) group->weight[stage][k][i][lane] = memory.weight[k][i][0];
+            }
+        group->fitting[stage] = 1;
+    }
+    ++group->fits;
+    group->slow = 0;
+    group->patience = helped && group->patience < 10000 ? 2 * group->patience + 150 : 100 * 150;
+}
+
+/* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group.
+   bound is what remains in each lane. */
+static int sklyanin_gyrostat_group_open(sklyanin_gyrostat_group *group, const sklyanin_gyrostat_lanes size, const sklyanin_gyrostat_lanes previous,
+    double bend, sklyanin_gyrostat_lanes bound)
+{
+    int open = 0;
+    for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) {
+        bound[lane] = sklyanin_gyrostat_remaining(size[lane], bend, bound[lane]);
+        const int solved = bound[lane] <= 1e-20 || (previous[lane] < 1e-8 && size[lane] < 1e-10);
+        if (!isfinite(size[lane])) group->active[lane] = 0;
+        open += group->active[lane] && !solved;
+    }
+    return open;
+}
+
+/* The guess for a stage: recurrences, or extrapolation; the state for members where that is not near. */
+static void sklyanin_gyrostat_group_predict(sklyanin_gyrostat_group *group, int stage, sklyanin_gyrostat_lanes y[4])
+{
+    if (group->fitting[stage]) sklyanin_gyrostat_group_foresee(group, stage, y);
+    else sklyanin_gyrostat_group_extrapolate(group, stage, y);
+    for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) {
+        double guess[4], state[4];
+        for (int i = 0; i < 4; ++i) {
+            guess[i] = y[i][lane];
+            state[i] = group->x[i][lane];
+        }
+        const int near = sklyanin_gyrostat_near(guess, state);
+        for (int i = 0; i < 4 && !near; ++i) y[i][lane] = state[i];
+    }
+}
+
+/* Newton's method for a stage, until the slowest lane is solved. The number of iterations; where that is the most
+   allowed, lanes that are not solved leave the group. */
+static int sklyanin_gyrostat_group_solve(sklyanin_gyrostat_group *group, int stage, sklyanin_gyrostat_model *model)
+{
+    sklyanin_gyrostat_lanes size, previous, bound;
+    double largest = HUGE_VAL, bend = 0.0;
+    int iterations = 0, open = 1;
+    for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
+    sklyanin_gyrostat_group_predict(group, stage, model->y);
+    for (; open > 0 && iterations < 20; ++iterations) {
+        memcpy(previous, size, sizeof size);
+        sklyanin_gyrostat_update(group->coef[stage], model, largest > 1e-05);
+        bend = largest > 1e-05 ? 0.0 : bend + largest;
+        for (int i = 0; i < 4; ++i) {
+            sklyanin_gyrostat_EACH_LANE
+            for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane)
+                model->residual[i][lane] =
+                    ((model->y[i][lane] - group->x[i][lane]) + model->displacement[i][lane]) - group->carry[i][lane];
+        }
+        sklyanin_gyrostat_correct(model, size);
+        open = sklyanin_gyrostat_group_open(group, size, previous, bend, bound);
+        largest = sklyanin_gyrostat_largest(size);
+    }
+    for (int lane = 0; lane < sklyanin_gyrostat_LANES && open > 0; ++lane)
+        group->active[lane] = group->active[lane] && bound[lane] <= 1e-20;
+    return iterations;
+}
+
+/* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
+static void sklyanin_gyrostat_group_advance(sklyanin_gyrostat_lanes x[restrict 4], sklyanin_gyrostat_lanes carry[restrict 4],
+    sklyanin_gyrostat_model *model)
+{
+    for (int i = 0; i < 4; ++i)
+        for (int j = 0; j < 4; ++j) {
+            sklyanin_gyrostat_EACH_LANE
+            for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane)
+                carry[i][lane] -= model->gain[i * 4 + j][lane] * model->residual[j][lane];
+        }
+    for (int i = 0; i < 4; ++i) {
+        sklyanin_gyrostat_EACH_LANE
+        for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) {
+            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
+            const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
+            x[i][lane] = sum + small;
+            carry[i][lane] = small - (x[i][lane] - sum);
+        }
+    }
+}
+
+/* One step of all members, of as many as remain. One that fails keeps its state, and leaves. How many are left. */
+static int sklyanin_gyrostat_group_step(sklyanin_gyrostat_group *group, size_t remaining)
+{
+    sklyanin_gyrostat_lanes x[4], carry[4];
+    sklyanin_gyrostat_model model;
+    const int next = (group->latest + 95 - 1) % 95;
+    int active = 0, most = 0;
+    memcpy(x, group->x, sizeof x);
+    memcpy(carry, group->carry, sizeof carry);
+    for (int stage = 0; stage < 1; ++stage) {
+        const int iterations = sklyanin_gyrostat_group_solve(group, stage, &model);
+        sklyanin_gyrostat_group_advance(group->x, group->carry, &model);
+        if (next % 8 == 0 || group->count < 8) sklyanin_gyrostat_group_judge(group, stage, model.y);
+        if (iterations > most) most = iterations;
+        memcpy(group->past[stage][next], model.y, sizeof model.y);
+    }
+    group->latest = next;
+    if (group->count < 95) ++group->count;
+    group->slow = most > 1 ? group->slow + 1 : 0;
+    if (group->slow > group->patience && group->count == 95 && remaining >= 600)
+        sklyanin_gyrostat_group_fit(group);
+    for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) {
+        for (int i = 0; i < 4; ++i)
+            if (!isfinite(group->x[i][lane])) group->active[lane] = 0;
+        for (int i = 0; i < 4 && !group->active[lane]; ++i) {
+            group->x[i][lane] = x[i][lane];
+            group->carry[i][lane] = carry[i][lane];
+        }
+        group->left[lane] -= group->active[lane] != 0;
+        active += group->active[lane] != 0;
+    }
+    return active;
+}
+
+/* Put a member into a lane: its state, and its coefficients. */
+static sklyanin_gyrostat_status sklyanin_gyrostat_group_join(sklyanin_gyrostat_group *group, int lane, const sklyanin_gyrostat_params *params,
+    const double x0[4], double h)
+{
+    sklyanin_gyrostat_solver s;
+    sklyanin_gyrostat_status status = sklyanin_gyrostat_init(&s, params, x0);
+    if (status == sklyanin_gyrostat_OK) status = sklyanin_gyrostat_set_step(&s, h);
+    if (status != sklyanin_gyrostat_OK) return status;
+    for (int i = 0; i < 4; ++i) group->x[i][lane] = s.x[i];
+    for (int stage = 0; stage < 1; ++stage)
+        for (int k = 0; k < 31; ++k) group->coef[stage][k][lane] = s.coef[stage][k];
+    memcpy(group->gauge[lane], s.gauge, sizeof s.gauge);
+    group->active[lane] = 1;
+    return status;
+}
+
+/* The steps that a member has still to make after it left the group, by itself. */
+static sklyanin_gyrostat_status sklyanin_gyrostat_group_finish(const sklyanin_gyrostat_group *group, int lane, const sklyanin_gyrostat_params *params,
+    double x[4], double h)
+{
+    sklyanin_gyrostat_solver s;
+    sklyanin_gyrostat_status status = sklyanin_gyrostat_init_gauge(&s, params, x, group->gauge[lane]);
+    if (status != sklyanin_gyrostat_OK) return status;
+    for (int i = 0; i < 4; ++i) s.carry[i] = group->carry[i][lane];
+    status = sklyanin_gyrostat_integrate(&s, h, group->left[lane]);
+    memcpy(x, s.x, sizeof s.x);
+    return status;
+}
+
+/* The members from first on, as many as there are lanes. The first status that is not OK. */
+static sklyanin_gyrostat_status sklyanin_gyrostat_group_run(const sklyanin_gyrostat_params *params, double *x, size_t members, size_t first,
+    double h, size_t steps, unsigned char *status)
+{
+    sklyanin_gyrostat_group group;
+    sklyanin_gyrostat_status worst = sklyanin_gyrostat_OK, member[8];
+    const int count = members - first < sklyanin_gyrostat_LANES ? (int)(members - first) : sklyanin_gyrostat_LANES;
+    double state[4];
+    memset(&group, 0, sizeof group);
+    for (int lane = 0; lane < count; ++lane) {
+        for (size_t i = 0; i < 4; ++i) state[i] = x[i * members + first + (size_t)lane];
+        group.left[lane] = steps;
+        member[lane] = sklyanin_gyrostat_group_join(&group, lane, params, state, h);
+    }
+    for (size_t k = 0; k < steps && sklyanin_gyrostat_group_step(&group, steps - k) > 2; ++k) continue;
+    for (int lane = 0; lane < count; ++lane) {
+        for (int i = 0; i < 4; ++i) state[i] = group.x[i][lane];
+        if (member[lane] == sklyanin_gyrostat_OK) {
+            if (group.left[lane] > 0) member[lane] = sklyanin_gyrostat_group_finish(&group, lane, params, state, h);
+            for (size_t i = 0; i < 4; ++i) x[i * members + first + (size_t)lane] = state[i];
+        }
+        if (status != NULL) status[first + (size_t)lane] = (unsigned char)member[lane];
+        if (worst == sklyanin_gyrostat_OK) worst = member[lane];
+    }
+    return worst;
 }
 
 sklyanin_gyrostat_status sklyanin_gyrostat_ensemble(const sklyanin_gyrostat_params *params, double *x,
@@ -901,21 +2655,28 @@ sklyanin_gyrostat_status sklyanin_gyrostat_ensemble(const sklyanin_gyrostat_para
                                                     unsigned char *status)
 {
     sklyanin_gyrostat_status worst = sklyanin_gyrostat_OK;
+    size_t earliest = members;
     if (x == NULL && members > 0) return sklyanin_gyrostat_BAD_ARGUMENT;
-    for (size_t m = 0; m < members; ++m) {
-        sklyanin_gyrostat_solver s;
-        double x0[4];
-        for (size_t i = 0; i < 4; ++i) x0[i] = x[i * members + m];
-        sklyanin_gyrostat_status member = sklyanin_gyrostat_init(&s, params, x0);
-        if (member == sklyanin_gyrostat_OK) {
-            member = sklyanin_gyrostat_integrate(&s, h, steps);
-            for (size_t i = 0; i < 4; ++i) x[i * members + m] = s.x[i];
+#ifdef _OPENMP
+#pragma omp parallel for schedule(dynamic)
+#endif
+    for (size_t first = 0; first < members; first += sklyanin_gyrostat_LANES) {
+        const sklyanin_gyrostat_status group = sklyanin_gyrostat_group_run(params, x, members, first, h, steps, status);
+        if (group == sklyanin_gyrostat_OK) continue;
+#ifdef _OPENMP
+#pragma omp critical
+#endif
+        if (first < earliest) {
+            earliest = first;
+            worst = group;
         }
-        if (status != NULL) status[m] = (unsigned char)member;
-        if (worst == sklyanin_gyrostat_OK) worst = member;
     }
     return worst;
 }
+
+#if defined(__clang__)
+#pragma clang diagnostic pop
+#endif
 
 /* the Hamiltonian */
 static void sklyanin_gyrostat_energy(const sklyanin_gyrostat_params *params, const double x[4],

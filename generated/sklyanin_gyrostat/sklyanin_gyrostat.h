@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: fd02c1a3d15c2bb48dba9ad5d873b3f4bb904c696a39cbf8e42afb8fa53a31aa
+ * body-sha256: 808ef6dea919a05a4e37eff076787d501f815bf4d6d642674b0cbae9a923b68b
  */
 #ifndef SKLYANIN_GYROSTAT_H
 #define SKLYANIN_GYROSTAT_H
@@ -47,7 +47,7 @@ typedef enum {
 } sklyanin_gyrostat_status;
 
 /* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
-   fitted to the last 96 values. They affect speed only. */
+   fitted to the last 95 values. They affect speed only. */
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
@@ -56,8 +56,8 @@ typedef struct {
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */
     int patience; /* how many of those before the recurrence is fitted again */
-    double past[192][sklyanin_gyrostat_DIM]; /* values, the latest last */
-    double weight[32][sklyanin_gyrostat_DIM][1]; /* of past values, the latest first, for the next value */
+    double past[190][sklyanin_gyrostat_DIM]; /* values, the latest last */
+    double weight[32][sklyanin_gyrostat_DIM][8]; /* of past values, the latest first, for the next values */
 } sklyanin_gyrostat_memory;
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with sklyanin_gyrostat_init. */
@@ -70,6 +70,13 @@ typedef struct {
     double gauge[1]; /* multiples of K0 taken from H */
     double h;  /* the step size that coef belongs to */
     int ready; /* whether coef has been computed */
+    double effort;  /* evaluations that a single step takes, for each stage */
+    int pause;      /* steps to make singly before a block is tried */
+    int setback;    /* the last pause, halved with every block that succeeds */
+    int foreseeing; /* whether blocks are guessed by recurrences */
+    int passes;     /* that the last block took which was guessed by Runge-Kutta steps */
+    size_t doubt;   /* steps to wait before recurrences are tried again */
+    size_t retry;   /* steps after which that is */
     double coef[1][31]; /* what depends on params and h only, for each stage */
     sklyanin_gyrostat_memory memory[1];
 } sklyanin_gyrostat_solver;
@@ -89,7 +96,8 @@ sklyanin_gyrostat_status sklyanin_gyrostat_step(sklyanin_gyrostat_solver *s, dou
 /* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 sklyanin_gyrostat_status sklyanin_gyrostat_integrate(sklyanin_gyrostat_solver *s, double h, size_t steps);
 
-/* Many members, in place: x[i * members + m] is coordinate i of member m. Each is integrated by itself.
+/* Many members, in place: x[i * members + m] is coordinate i of member m. 8 are integrated
+   side by side, and with OpenMP such groups in parallel.
    status (or NULL) receives the status of each member; a failed member keeps its last good state.
    Returns the first status that is not OK. */
 sklyanin_gyrostat_status sklyanin_gyrostat_ensemble(const sklyanin_gyrostat_params *params, double *x,

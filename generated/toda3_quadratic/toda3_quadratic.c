@@ -12,7 +12,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 298b3edcf203a1b3eb6bfc820d0c99eceb714e636b8f93558e0c3fa41f26e642
+ * body-sha256: 8188b2ccde6a7d5c074c0e20886bc2e7c044e66ab6892ff7b1cee1aea796bd18
  */
 #include "toda3_quadratic.h"
 
@@ -113,7 +113,7 @@ static int toda3_quadratic_near(const double guess[5], const double last[5])
     return distance <= 4.0 * size;
 }
 
-/* The guess for the next value (p), from earlier ones; 0 if there is none. */
+/* The guess for the next value (y), from earlier ones; 0 if there is none. */
 static int toda3_quadratic_predict(const toda3_quadratic_memory *memory, double value[5])
 {
     const int last = memory->count - 1;
@@ -282,7 +282,7 @@ static int toda3_quadratic_advance(toda3_quadratic_solver *s, const double chang
 }
 
 /* Coefficient k of the product of two Taylor series. */
-static double toda3_quadratic_product(const double *a, const double *b, int k)
+static double toda3_quadratic_taylor_product(const double *a, const double *b, int k)
 {
     double sum = 0.0;
     for (int j = 0; j <= k; ++j) sum += a[j] * b[k - j];
@@ -394,32 +394,32 @@ static int toda3_quadratic_piece(const double *coef, const double p[5], const do
     s[40][0] = s[38][0] - s[39][0];
     for (int k = 0; k < 30; ++k) {
         if (k > 0) {
-            s[5][k] = toda3_quadratic_product(s[0], s[3], k);
+            s[5][k] = toda3_quadratic_taylor_product(s[0], s[3], k);
             s[6][k] = p[3] * s[5][k];
-            s[7][k] = toda3_quadratic_product(s[0], s[1], k);
+            s[7][k] = toda3_quadratic_taylor_product(s[0], s[1], k);
             s[8][k] = p[1] * s[7][k];
             s[9][k] = 0.5 * s[8][k];
-            s[10][k] = toda3_quadratic_product(s[0], s[2], k);
+            s[10][k] = toda3_quadratic_taylor_product(s[0], s[2], k);
             s[11][k] = p[2] * s[10][k];
             s[12][k] = s[9][k] - s[11][k];
             s[13][k] = s[6][k] + s[12][k];
-            s[14][k] = toda3_quadratic_product(s[1], s[4], k);
+            s[14][k] = toda3_quadratic_taylor_product(s[1], s[4], k);
             s[15][k] = p[4] * s[14][k];
             s[16][k] = p[0] * s[7][k];
             s[17][k] = -0.5 * s[16][k];
-            s[18][k] = toda3_quadratic_product(s[1], s[3], k);
+            s[18][k] = toda3_quadratic_taylor_product(s[1], s[3], k);
             s[19][k] = p[3] * s[18][k];
             s[20][k] = s[17][k] - s[19][k];
             s[21][k] = s[15][k] + s[20][k];
             s[22][k] = p[0] * s[10][k];
-            s[23][k] = toda3_quadratic_product(s[0], s[0], k);
+            s[23][k] = toda3_quadratic_taylor_product(s[0], s[0], k);
             s[24][k] = p[3] * s[23][k];
             s[25][k] = 2.0 * s[24][k];
             s[26][k] = s[22][k] + s[25][k];
             s[27][k] = p[1] * s[18][k];
             s[28][k] = p[0] * s[5][k];
             s[29][k] = s[27][k] - s[28][k];
-            s[30][k] = toda3_quadratic_product(s[1], s[1], k);
+            s[30][k] = toda3_quadratic_taylor_product(s[1], s[1], k);
             s[31][k] = p[4] * s[30][k];
             s[32][k] = 2.0 * s[31][k];
             s[33][k] = p[2] * s[23][k];
@@ -476,12 +476,12 @@ static int toda3_quadratic_path(const double *coef, const double x[5], const dou
     return 0;
 }
 
-/* The residual p - grad S_h(mean of the path) of the equation for p, with the path's change of x and an
-   approximate Jacobian of the residual. 0 if the path cannot be followed. */
-static int toda3_quadratic_residual(toda3_quadratic_solver *s, const double *coef, const double p[5], double residual[5],
-    double change[5], double jacobian[25])
+/* The residual p - grad S_h(mean of the path) of the equation for p, with that mean y, the path's change of
+   x and an approximate Jacobian of the residual. 0 if the path cannot be followed. */
+static int toda3_quadratic_residual(toda3_quadratic_solver *s, const double *coef, const double p[5], double y[5],
+    double residual[5], double change[5], double jacobian[25])
 {
-    double y[5], mean[5];
+    double mean[5];
     if (!toda3_quadratic_path(coef, s->x, p, change, mean)) return 0;
     for (int i = 0; i < 5; ++i) y[i] = s->x[i] + mean[i];
     toda3_quadratic_generate(coef, y, residual, jacobian);
@@ -494,12 +494,12 @@ static int toda3_quadratic_residual(toda3_quadratic_solver *s, const double *coe
 static int toda3_quadratic_differences(toda3_quadratic_solver *s, const double *coef, const double p[5],
     const double residual[5], double jacobian[25])
 {
-    double q[5], moved[5], change[5], unused[25], norm = DBL_MIN;
+    double q[5], y[5], moved[5], change[5], unused[25], norm = DBL_MIN;
     for (int i = 0; i < 5; ++i) norm = fabs(p[i]) > norm ? fabs(p[i]) : norm;
     for (int j = 0; j < 5; ++j) {
         memcpy(q, p, sizeof q);
         q[j] += 1e-7 * norm;
-        if (!toda3_quadratic_residual(s, coef, q, moved, change, unused)) return 0;
+        if (!toda3_quadratic_residual(s, coef, q, y, moved, change, unused)) return 0;
         for (int i = 0; i < 5; ++i) jacobian[i * 5 + j] = (moved[i] - residual[i]) / (q[j] - p[j]);
     }
     return 1;
@@ -510,10 +510,11 @@ static toda3_quadratic_status toda3_quadratic_attempt(toda3_quadratic_solver *s,
 {
     const double *coef = s->coef[stage], none[5] = { 0.0 };
     toda3_quadratic_memory *memory = &s->memory[stage];
-    double p[5], residual[5], change[5], jacobian[25], previous = HUGE_VAL;
-    toda3_quadratic_predict(memory, p);
+    double p[5], y[5], residual[5], change[5], jacobian[25], previous = HUGE_VAL;
+    if (!toda3_quadratic_predict(memory, y)) memcpy(y, s->x, sizeof y);
+    toda3_quadratic_generate(coef, y, p, jacobian);
     for (int iteration = 0; iteration < 20; ++iteration) {
-        if (!toda3_quadratic_residual(s, coef, p, residual, change, jacobian)) return toda3_quadratic_NO_CONVERGENCE;
+        if (!toda3_quadratic_residual(s, coef, p, y, residual, change, jacobian)) return toda3_quadratic_NO_CONVERGENCE;
         double size = 0.0, norm = DBL_MIN;
         for (int i = 0; i < 5; ++i) {
             if (!isfinite(residual[i])) return toda3_quadratic_NOT_FINITE;
@@ -524,7 +525,7 @@ static toda3_quadratic_status toda3_quadratic_attempt(toda3_quadratic_solver *s,
         /* The second test: residuals no longer shrink, the solve has reached the level of rounding. */
         if (size <= 4e-16 || (previous < 1e-12 && size > 0.25 * previous)) {
             if (!toda3_quadratic_advance(s, change, none)) return toda3_quadratic_NOT_FINITE;
-            toda3_quadratic_remember(memory, p, iteration);
+            toda3_quadratic_remember(memory, y, iteration);
             return toda3_quadratic_OK;
         }
         if (iteration >= 3 && size > 0.2 * previous && !toda3_quadratic_differences(s, coef, p, residual, jacobian))

@@ -9,13 +9,13 @@ from phigen.scheme.discretisation import MOST_OPERATIONS, discretise, too_large
 from phigen.scheme.gauge import Gauge
 from phigen.scheme.gauge import kernels as gauge_kernels
 from phigen.scheme.generating import STEP
-from phigen.scheme.kernels import observables, path_kernels, step_kernels
+from phigen.scheme.kernels import inverse, observables, path_kernels, step_kernels
 from phigen.scheme.lowering import cost, operation_counts
 from phigen.scheme.modified import modified_kernel
 from phigen.scheme.order import Order
-from phigen.scheme.path import build_path
+from phigen.scheme.path import build_path, build_slopes
 from phigen.scheme.program import Kernel, Output, Program
-from phigen.scheme.tangent import tangent_kernels, tangent_path
+from phigen.scheme.tangent import curvature, tangent_kernels, tangent_path
 from phigen.spec.model import NO_EXTRAS, Extras, SolverOptions
 
 DRIVERS = {
@@ -23,6 +23,9 @@ DRIVERS = {
     "newton": "implicit, Newton iteration with the analytic matrix",
     "path": "implicit in p, each path followed by its Taylor series to round-off",
 }
+
+#: Largest dimension in which paths are followed in lanes; beyond, their derivatives cost what lanes save (measured).
+MOST_IN_LANES = 4
 
 
 def build_program(
@@ -45,8 +48,12 @@ def build_program(
     generating = scheme.generating
     coefficients = generating.coefficients
     path = build_path(system, coefficients) if realisation.path else None
+    slopes = None
     if path:
         kernels = path_kernels(system, generating, coefficients)
+        if solver.lanes and system.dimension <= MOST_IN_LANES:
+            slopes = build_slopes(system, coefficients)
+            kernels |= {"curvature": curvature(system, generating, coefficients), "invert": inverse(system.dimension)}
     else:
         kernels = step_kernels(system, realisation, generating, coefficients)
     if extras.tangent:
@@ -85,6 +92,7 @@ def build_program(
         coefficients=len(coefficients.values),
         kernels={"prepare": prepare, **kernels},
         path=path,
+        path_slopes=slopes,
         gauge=gauge.free,
         extras=extras,
         tangent_path=varied,

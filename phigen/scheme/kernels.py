@@ -58,7 +58,7 @@ def step_kernels(
             named,
         )
     }
-    return kernels | _elimination_kernel(n) | _inversion_kernel(n)
+    return kernels | _elimination_kernel(n) | ({"invert": inverse(n)} if n <= UNROLLED else {})
 
 
 def _elimination_kernel(n: int) -> dict[str, Kernel]:
@@ -78,19 +78,16 @@ def _elimination_kernel(n: int) -> dict[str, Kernel]:
     }
 
 
-def _inversion_kernel(n: int) -> dict[str, Kernel]:
-    if n > UNROLLED:
-        return {}
-    inverse, gain, reciprocals = inversion(n)
+def inverse(n: int) -> Kernel:
+    """The inverse of a matrix, and a product with it, unrolled."""
+    entries, gain, reciprocals = inversion(n)
     pairs = [(i, j) for i in range(n) for j in range(n)]
-    return {
-        "invert": Kernel(
-            "invert",
-            "elimination without pivoting: the inverse, the slope times the inverse, the reciprocals of the pivots",
-            {"matrix": tuple(f"J:{i}:{j}" for i, j in pairs), "slope": tuple(f"K:{i}:{j}" for i, j in pairs)},
-            (Output("inverse", tuple(inverse)), Output("gain", tuple(gain)), Output("reciprocal", tuple(reciprocals))),
-        )
-    }
+    return Kernel(
+        "invert",
+        "elimination without pivoting: the inverse, the slope times the inverse, the reciprocals of the pivots",
+        {"matrix": tuple(f"J:{i}:{j}" for i, j in pairs), "slope": tuple(f"K:{i}:{j}" for i, j in pairs)},
+        (Output("inverse", tuple(entries)), Output("gain", tuple(gain)), Output("reciprocal", tuple(reciprocals))),
+    )
 
 
 def path_kernels(system: System, generating: GeneratingFunction, coefficients: Coefficients) -> dict[str, Kernel]:

@@ -15,7 +15,7 @@ from phigen.geometry.system import System, hamiltonian_vector_field
 from phigen.scheme.lowering import expand_powers
 from phigen.scheme.staging import Coefficients
 from phigen.series.hamilton_jacobi import momentum
-from phigen.symbolic.expression import Expression, fold, partials, raw, symbol
+from phigen.symbolic.expression import Expression, derivatives, fold, partials, raw, symbol
 from phigen.symbolic.taylor import closure
 
 
@@ -60,11 +60,49 @@ class Path:
     fixed: tuple[Expression, ...]
 
 
+@dataclass(frozen=True)
+class Entry:
+    """An entry of a matrix that is not 0, and its series."""
+
+    row: int
+    column: int
+    series: int
+
+
+@dataclass(frozen=True)
+class PathSlopes:
+    """What the derivatives of a path along its start and along p follow from: V̇ = J V + (0, π), for V = (∂m, ∂_p m).
+
+    ``series`` and ``fixed`` go on from those of the path. ``jacobian`` is J = ∂(π(m)p)/∂m, ``tensor`` is π(m).
+    """
+
+    series: tuple[Series, ...]
+    fixed: tuple[Expression, ...]
+    jacobian: tuple[Entry, ...]
+    tensor: tuple[Entry, ...]
+
+
 def build_path(system: System, coefficients: Coefficients) -> Path:
     """The recurrences of ṁ = π(m)p; values that depend on parameters only go to the table."""
+    return path_of(system.coordinates, _flow(system, coefficients))
+
+
+def build_slopes(system: System, coefficients: Coefficients) -> PathSlopes:
+    """The further recurrences for the derivatives of the path of `build_path`."""
+    n, flow = system.dimension, _flow(system, coefficients)
+    columns = [derivatives(flow, c) for c in system.coordinates]
+    jacobian = [columns[j][i] for i in range(n) for j in range(n)]
+    tensor = coefficients.hoist([e for row in system.poisson for e in row])
+    return _Builder(system.coordinates).slopes(*_apart(_chains([*flow, *jacobian, *tensor]), n))
+
+
+def _flow(system: System, coefficients: Coefficients) -> list[Expression]:
     covector = [symbol(momentum(c)) for c in system.coordinates]
-    flow = coefficients.hoist(hamiltonian_vector_field(system.poisson, covector))
-    return path_of(system.coordinates, flow)
+    return coefficients.hoist(hamiltonian_vector_field(system.poisson, covector))
+
+
+def _apart(roots: Sequence[Expression], n: int) -> tuple[Sequence[Expression], ...]:
+    return roots[:n], roots[n : n + n * n], roots[n + n * n :]
 
 
 def path_of(coordinates: Sequence[str], flow: Sequence[Expression]) -> Path:
@@ -95,21 +133,37 @@ class _Builder:
         self._keep: list[Expression] = []
 
     def path(self, flow: Sequence[Expression]) -> Path:
-        order = closure(flow)
-        self._keep = order  # values are found by id, so the nodes must live
+        self._include(flow)
+        slopes = tuple(self._as_series(f) for f in flow)  # may add series
+        return Path(tuple(self.series), slopes, tuple(self.fixed))
+
+    def slopes(
+        self, flow: Sequence[Expression], jacobian: Sequence[Expression], tensor: Sequence[Expression]
+    ) -> PathSlopes:
+        path = self.path(flow)
+        self._include([*jacobian, *tensor])
+        entries = self._entries(jacobian), self._entries(tensor)
+        return PathSlopes(tuple(self.series[len(path.series) :]), tuple(self.fixed[len(path.fixed) :]), *entries)
+
+    def _entries(self, matrix: Sequence[Expression]) -> tuple[Entry, ...]:
+        n = len(self.coordinates)
+        return tuple(Entry(*divmod(k, n), self._as_series(e)) for k, e in enumerate(matrix) if not e.is_zero)
+
+    def _include(self, roots: Sequence[Expression]) -> None:
+        order = closure(roots)
+        self._keep += order  # values are found by id, so the nodes must live
         moving = self._moving(order)
-        for e in order:
-            if e.op == "symbol" and e.value in self.coordinates:
+        fresh = [e for e in order if id(e) in moving and id(e) not in self._series_of]
+        for e in fresh:
+            if e.op == "symbol":
                 self._series_of[id(e)] = self.coordinates.index(e.value)
-            elif id(e) in moving:
+            else:
                 self._series_of[id(e)] = len(self.series)
                 # Functions refer to series of their derivatives, which may come later: filled in below.
                 self.series.append(Series(symbol("pending")))
-        for e in order:
-            if id(e) in moving and e.args:
+        for e in fresh:
+            if e.args:
                 self.series[self._series_of[id(e)]] = self._rule(e)
-        slopes = tuple(self._as_series(f) for f in flow)  # may add series
-        return Path(tuple(self.series), slopes, tuple(self.fixed))
 
     def _moving(self, order: Sequence[Expression]) -> set[int]:
         moving: set[int] = set()

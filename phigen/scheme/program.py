@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 
 from phigen._version import __version__
 from phigen.scheme.alternation import Schedule
-from phigen.scheme.path import Path
+from phigen.scheme.path import Path, PathSlopes
 from phigen.spec.model import NO_EXTRAS, Extras, Parameter
 from phigen.symbolic.expression import Expression
 
@@ -53,9 +53,10 @@ class Program:
 
     ``schedule`` lists the flows of a step of a splitting, whose kernels are ``flow1``, ``flow2``, …; there is a table
     of coefficients for each row of the schedule; ``composition`` is its name. ``path`` holds the recurrences of a path
-    driver. A step of size h is the composition of one step of each of the ``fractions`` of h. ``tangent_path`` is the
-    path with its variation (`phigen.scheme.tangent`), if ``extras`` ask for the tangent map. ``gauge`` names the
-    Casimirs whose multiple the solver chooses for each trajectory.
+    driver, ``path_slopes`` those for its derivatives, if several paths are to be followed in ``lanes``. A step of size
+    h is the composition of one step of each of the ``fractions`` of h. ``tangent_path`` is the path with its variation
+    (`phigen.scheme.tangent`), if ``extras`` ask for the tangent map. ``gauge`` names the Casimirs whose multiple the
+    solver chooses for each trajectory.
 
     ``relative`` tells that the coordinates are positive or keep their sign (log-canonical π), so that errors
     of the inner solve count relative to each coordinate. ``facts`` are the lines of the header.
@@ -71,6 +72,7 @@ class Program:
     coefficients: int
     kernels: Mapping[str, Kernel]
     path: Path | None = None
+    path_slopes: PathSlopes | None = None
     schedule: Schedule | None = None
     composition: str = ""
     fractions: tuple[float, ...] = (1.0,)

@@ -1,5 +1,5 @@
 /* Blocks of steps and groups of members against single steps, from inside the generated file.
-   Compile with -DNAME=… -DSOURCE="…" -DSTEP=…, -DULPS=…, -DSTATE="…" (initial values separated by commas). */
+   Compile with -DNAME=… -DSOURCE="…" -DSTEP=…, -DULPS=…, -DGROUPS=… (whether there are groups), -DSTATE="…" (initial values separated by commas). */
 #include <stdio.h>
 #include <stdlib.h>
 
@@ -89,6 +89,7 @@ static void integrate_equals_steps(int steps)
     EXPECT(apart <= ULPS * 0.5 * DBL_EPSILON * size);
 }
 
+#if GROUPS
 /* Members of one group, with extrapolated guesses and then with fitted ones, and one lane empty. */
 static void group_equals_steps(int steps)
 {
@@ -140,6 +141,7 @@ static void group_fits(void)
     }
     EXPECT(apart <= 0.3 * moved);
 }
+#endif
 
 /* The whole ensemble, the last group of which is not full; a member without a state is said to be so. */
 static void ensemble_equals_steps(int steps)
@@ -171,8 +173,10 @@ int main(void)
     integrate_equals_steps(1);
     integrate_equals_steps(7);
     integrate_equals_steps(301);
+#if GROUPS
     group_equals_steps(150);
     group_fits();
+#endif
     ensemble_equals_steps(40);
     return 0;
 }

@@ -14,6 +14,7 @@ from phigen.targets.c import lanes
 #: stage.
 GROWING = {"gaussian_moments": 20, "henon_heiles": 20, "kowalevski_top": 20, "pendulum": 20}
 GROWING |= {"harmonic_oscillator": 2}  # from step 150 on its points are foreseen, and round otherwise: a random walk
+GROWING |= {"nambu_pendulum": 20}
 GROWING |= {"poisson_not_hamiltonian": 500}  # a start changed by one unit ends 220 units apart
 
 EXERCISE = Path(__file__).with_name("blocks.c")
@@ -53,10 +54,12 @@ def test_members_go_one_by_one_where_a_group_would_take_too_much_stack():
 def exercise(compilation, optimisation, folder):
     """Build and run blocks.c for a system."""
     name = compilation.program.name
-    write(folder, emit(compilation.program, "c", COMMAND, single_file=True))
+    code = emit(compilation.program, "c", COMMAND, single_file=True)
+    write(folder, code)
     at = setting(compilation)
     definitions = [f"-DNAME={name}", f'-DSOURCE="{name}.c"', f"-DSTEP={at.h!r}"]
     definitions.append(f"-DULPS={GROWING.get(name, len(compilation.program.fractions))}")
+    definitions.append(f"-DGROUPS={int(f'{name}_group;' in code[f'{name}.c'])}")
     definitions.append("-DSTATE=" + ", ".join(map(repr, at.x)))
     flags = ["-std=c99", optimisation, "-Wall", "-Wextra", "-Werror", "-Wno-unused-function"]
     run([tool("gcc"), *flags, *definitions, "-I.", EXERCISE, "-o", "blocks", "-lm"], folder)

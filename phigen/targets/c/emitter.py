@@ -79,7 +79,6 @@ def _values(program: Program) -> dict[str, object]:
         "fractions": ", ".join(repr(f) for f in program.fractions),
         "terms": TERMS,
         "series": len(program.path.series) if program.path else 0,
-        "remembered": "p" if program.path else "y",
         "coefficients": max(1, program.coefficients),
         "history": HISTORY,
         **_memory_values(program),
@@ -196,7 +195,7 @@ def _path_syntax(program: Program) -> Syntax:
         first="s[{i}][0] = {value};",
         following="s[{i}][k] = {value};",
         slope="s[{i}][k + 1] = s[{slope}][k] / (k + 1);",
-        sums=program.name,
+        sums=f"{program.name}_taylor",
     )
 
 

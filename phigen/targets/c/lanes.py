@@ -10,6 +10,7 @@ from typing import Any
 from phigen.scheme.program import Kernel, Program
 from phigen.symbolic.expression import topological
 from phigen.symbolic.special import LANE_REACH, SPECIAL, lane_coefficients, order_of
+from phigen.targets.c import paths
 from phigen.targets.c.kernels import FUNCTIONS, LANE_FORMULAS, LANE_FUNCTIONS, LANES, each_lane, function
 from phigen.targets.rendering import render
 
@@ -17,7 +18,8 @@ from phigen.targets.rendering import render
 MOST_STACK = 256 * 1024
 
 #: Passes over a block that cost, per step, what an evaluation at one point costs: with loops that are vectorised, and
-#: with loops that are not as they call functions of the library.
+#: with loops that are not as they call functions of the library, or with derivatives of paths, of which an evaluation
+#: at one point has no need.
 PASSES, PASSES_OF_CALLS = 2, 1
 
 #: Corrections below which the next pass goes on with the matrices of the last, as its error is then of third order.
@@ -28,7 +30,7 @@ INLINE = {"abs", "sqrt", "sign", "inv"}
 
 #: Templates in the order in which they call one another.
 _MODELS = ("sizes", "correct", "near_lanes", "solved")
-_BLOCKS = (*_MODELS, "chain", "block", "march", "block_step", "choose_guess", "integrate_blocks")
+_BLOCKS = ("chain", "block", "march", "block_step", "choose_guess", "integrate_blocks")
 _GROUPS = ("group", "group_guess", "group_fit", "group_solve", "group_step", "group_run", "ensemble")
 
 _MEMBERS = [
@@ -62,11 +64,20 @@ _PI = 3.141592651605606, 1.9841871479187034e-09, 1.1442377452219664e-17
 
 
 def blocks(program: Program) -> bool:
-    """Whether `integrate` takes blocks of steps: not for paths, explicit steps, what would need too much stack, or
-    where the spec says no."""
+    """Whether `integrate` takes blocks of steps: not for explicit steps, long paths (`paths.applies`), what would need
+    too much stack, or where the spec says no."""
+    able = program.driver == "newton" or (program.driver == "path" and program.path_slopes is not None)
+    return program.lanes and able and _block_size(program, paths.SLOPE_TERMS[-1]) <= MOST_STACK
+
+
+def _block_size(program: Program, slope_terms: int) -> int:
     n = program.dimension
-    values = len(program.fractions) * (program.coefficients + 4 * n + 3 * n * n)
-    return program.lanes and program.driver == "newton" and 8 * LANES * values <= MOST_STACK
+    more, once = paths.stack(program, slope_terms)
+    return 8 * LANES * (len(program.fractions) * (program.coefficients + 4 * n + 3 * n * n + more) + once)
+
+
+def _slope_terms(program: Program) -> int:
+    return next(k for k in paths.SLOPE_TERMS if _block_size(program, k) <= MOST_STACK)
 
 
 def vectorised(program: Program) -> bool:
@@ -74,14 +85,27 @@ def vectorised(program: Program) -> bool:
     if not blocks(program):
         return False
     calls = set(FUNCTIONS) - set(LANE_FUNCTIONS) - set(LANE_FORMULAS) - INLINE
-    return not calls & {e.op for e in topological(program.kernels["linearise"].roots)}
+    return not calls & _operations(program)
+
+
+def _operations(program: Program) -> set[str]:
+    """What the kernels that are evaluated in lanes call."""
+    kernels = paths.kernels(program) if program.path else [program.kernels["linearise"]]
+    return {e.op for e in topological([e for kernel in kernels for e in kernel.roots])}
 
 
 def groups(program: Program, rows: int) -> bool:
     """Whether ensembles are integrated in groups, each with so many rows of values and weights on the stack."""
     n = program.dimension
-    values = len(program.fractions) * (program.coefficients + rows * n) + 7 * n + 3 * n * n
-    return blocks(program) and 8 * LANES * values <= MOST_STACK
+    if not blocks(program):
+        return False
+    values = (
+        len(program.fractions) * (program.coefficients + rows * n)
+        + 7 * n
+        + 3 * n * n
+        + sum(paths.stack(program, _slope_terms(program)))
+    )
+    return 8 * LANES * values <= MOST_STACK
 
 
 def values(program: Program, memory: Mapping[str, int]) -> Mapping[str, object]:
@@ -92,7 +116,8 @@ def values(program: Program, memory: Mapping[str, int]) -> Mapping[str, object]:
         "each_lane": each_lane(program),
         "floor": "0.0" if program.relative else "1e-6",
         "frozen": repr(FROZEN),
-        "passes": PASSES if vectorised(program) else PASSES_OF_CALLS,
+        "passes": PASSES if vectorised(program) and not program.path else PASSES_OF_CALLS,
+        "model_members": paths.model_members(program) if blocks(program) else [],
         "ensemble_how": f"{LANES} are integrated\n   side by side, and with OpenMP such groups in parallel."
         if grouped
         else "Each is integrated by itself.",
@@ -121,18 +146,30 @@ def pieces(program: Program, values: Mapping[str, Any]) -> list[str]:
     ensemble: tuple[str, ...] = values["ensemble_templates"]
     if not blocks(program):
         return [render("c", f"{template}.c", values) for template in ("integrate", *ensemble)]
-    kernel = program.kernels["linearise"]
     found = [render("c", f"{template}.c", values) for template in ("lanes", "table")]
-    found += lane_functions(program, {e.op for e in topological(kernel.roots)})
-    found.append(function(program, kernel, lanes=True) + "\n")
+    found += lane_functions(program, _operations(program))
+    found += _paths(program, values) if program.path else _stages(program, values)
+    return found + [render("c", f"{template}.c", values) for template in (*_BLOCKS, *ensemble, "lanes_end")]
+
+
+def _stages(program: Program, values: Mapping[str, Any]) -> list[str]:
+    """A stage in all lanes, for alpha and beta that are formulas."""
+    kernel = program.kernels["linearise"]
+    found = [function(program, kernel, lanes=True) + "\n"]
     found.append(function(program, _without_matrices(kernel), lanes=True) + "\n")
     if "invert" in program.kernels:
         found.append(function(program, program.kernels["invert"], lanes=True) + "\n")
         found.append(render("c", "tabulate_unrolled.c", values))
     else:
         found.append(render("c", "tabulate.c", values))
-    templates = (*_BLOCKS, *ensemble, "lanes_end")
-    return found + [render("c", f"{template}.c", values) for template in templates]
+    return found + [render("c", f"{template}.c", values) for template in (*_MODELS, "update")]
+
+
+def _paths(program: Program, values: Mapping[str, Any]) -> list[str]:
+    """A stage in all lanes, for alpha and beta that are the ends of a path."""
+    found = [function(program, kernel, lanes=True) + "\n" for kernel in paths.kernels(program)]
+    found += [render("c", f"{template}.c", values) for template in _MODELS]
+    return found + paths.pieces(program, values, _slope_terms(program))
 
 
 def lane_functions(program: Program, ops: Set[str]) -> list[str]:

@@ -1,0 +1,289 @@
+"""Paths in all lanes: what blocks of steps and groups of members need of a solver that follows paths."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from phigen.scheme.lowering import expand_powers
+from phigen.scheme.path import Entry, PathSlopes, Series, Term
+from phigen.scheme.program import Kernel, Output, Program
+from phigen.scheme.step import Matrix, inversion
+from phigen.series.hamilton_jacobi import momentum
+from phigen.symbolic.expression import ONE, ZERO, Expression, substitute, symbol, total
+from phigen.targets.c.kernels import FUNCTIONS, each_lane, printer
+from phigen.targets.names import Scope
+from phigen.targets.rendering import render
+
+#: Most terms of the expansion of a path from its middle.
+TERMS = 16
+
+#: Most terms of the expansion of its derivatives, fewer where the stack is too small; their accuracy.
+SLOPE_TERMS, SLOPE_ACCURACY = (12, 8), 1e-7
+
+#: Templates in the order in which they call one another.
+TEMPLATES = (
+    *("path_lanes", "path_follow", "path_expand", "path_holds", "path_settle", "path_rough"),
+    *("path_vary", "path_slopes", "path_update", "path_table"),
+)
+
+#: Longest loop over lanes, in statements.
+LONGEST_LOOP = 60
+
+
+def stack(program: Program, slope_terms: int) -> tuple[int, int]:
+    """Values in each lane on the stack: of a model, beside those of any driver, and of an expansion."""
+    if program.path is None or program.path_slopes is None:
+        return 0, 0
+    n, path, slopes = program.dimension, program.path, program.path_slopes
+    series = len(path.series) * (TERMS + 3) + len(slopes.series) * (slope_terms + 2)
+    fixed = len(path.fixed) + len(slopes.fixed)
+    return 2 * n + 3 * n * n, series + fixed + 2 * n * n * (slope_terms + 4) + 2 * n * n + 8 * n
+
+
+def model_members(program: Program) -> list[str]:
+    """What a model remembers of the path in its lane."""
+    if program.path is None:
+        return []
+    name, n = program.name, program.dimension
+    return [
+        f"{name}_lanes at[{n}], middle[{n}]; /* y when it was last evaluated, the middle of the path less y */",
+        f"{name}_lanes sway[{n * n}]; /* the derivative of middle along y */",
+        f"{name}_lanes alpha_y[{n * n}], increment_y[{n * n}]; /* of alpha and beta - alpha, with p held fixed */",
+    ]
+
+
+def kernels(program: Program) -> list[Kernel]:
+    """The kernels at one point: p = ∇S_h with its derivative, and without; first coefficients of all series."""
+    assert program.path is not None
+    assert program.path_slopes is not None
+    path, slopes, coordinates = program.path, program.path_slopes, program.coordinates
+    curvature = program.kernels["curvature"]
+    coef, covector = curvature.inputs["coef"], tuple(momentum(c) for c in coordinates)
+    values = _resolved(path.series, path.fixed, {})
+    base = {f"s:{i}" for i in range(len(path.series))} | {f"f:{i}" for i in range(len(path.fixed))}
+    further = _resolved(slopes.series, slopes.fixed, {s: symbol(s) for s in base}, len(path.series), len(path.fixed))
+    return [
+        curvature,
+        Kernel("momentum", "p = grad S_h(y)", curvature.inputs, curvature.outputs[:1]),
+        Kernel(
+            "values",
+            "the values of all series at one point",
+            {"coef": coef, "p": covector, "m": coordinates},
+            (Output("value", values[0]), Output("fixed", values[1])),
+        ),
+        Kernel(
+            "slope_values",
+            "the values of the further series",
+            {
+                "coef": coef,
+                "p": covector,
+                "value": tuple(f"s:{i}" for i in range(len(path.series))),
+                "fixed": tuple(f"f:{i}" for i in range(len(path.fixed))),
+            },
+            (Output("slope", further[0]), Output("slope_fixed", further[1])),
+        ),
+        _along_mean(program.dimension),
+        program.kernels["invert"],
+    ]
+
+
+def _along_mean(n: int) -> Kernel:
+    """Derivatives along the mean y of a path, from those of its ends and mean along its middle m and along p.
+
+    For p held fixed m follows y by M⁻¹, M the derivative of the mean along m; with p = ∇S_h(y) by M⁻¹ (1 − N H), N that
+    along p and H the Hessian of S_h.
+    """
+    inputs = {name: tuple(f"{name}:{i}" for i in range(2 * n * n)) for name in ("even", "odd", "mean")}
+    inputs["hessian"] = tuple(f"hessian:{i}" for i in range(n * n))
+    hessian = _matrix([symbol(s) for s in inputs["hessian"]], n, n, 0)
+    even, odd, mean = ([symbol(s) for s in inputs[name]] for name in ("even", "odd", "mean"))
+    start, change = [a - b for a, b in zip(even, odd, strict=True)], [2 * b for b in odd]
+    inverse, reciprocals = _inverse(_matrix(mean, n, 2 * n, 0))
+    follows = _times(inverse, _plus(_identity(n), _times(_matrix(mean, n, 2 * n, n), hessian), -1))
+    fixed, along = [], []
+    for value in (start, change):
+        by_m, by_p = _matrix(value, n, 2 * n, 0), _matrix(value, n, 2 * n, n)
+        fixed.append(_times(by_m, inverse))
+        along.append(_plus(_times(by_m, follows), _times(by_p, hessian)))
+    named = zip(
+        ("alpha_y", "increment_y", "jacobian", "increment_jacobian", "sway"),
+        (*fixed, *along, _plus(follows, _identity(n), -1)),
+        strict=True,
+    )
+    outputs = [Output(name, tuple(e for row in matrix for e in row)) for name, matrix in named]
+    purpose = "derivatives along the mean of a path"
+    return Kernel("along_mean", purpose, inputs, (*outputs, Output("reciprocal", tuple(reciprocals))))
+
+
+def _matrix(values: Sequence[Expression], n: int, width: int, first: int) -> Matrix:
+    return [[values[i * width + first + j] for j in range(n)] for i in range(n)]
+
+
+def _identity(n: int) -> Matrix:
+    return [[ONE if i == j else ZERO for j in range(n)] for i in range(n)]
+
+
+def _plus(a: Matrix, b: Matrix, sign: int = 1) -> Matrix:
+    return [[x + y if sign > 0 else x - y for x, y in zip(r, q, strict=True)] for r, q in zip(a, b, strict=True)]
+
+
+def _times(a: Matrix, b: Matrix) -> Matrix:
+    return [[total(x * r[j] for x, r in zip(row, b, strict=True)) for j in range(len(b))] for row in a]
+
+
+def _inverse(a: Matrix) -> tuple[Matrix, list[Expression]]:
+    n = len(a)
+    inverse, _, reciprocals = inversion(n)
+    values = {f"J:{i}:{j}": a[i][j] for i in range(n) for j in range(n)}
+    done = substitute([*inverse, *reciprocals], values)
+    return _matrix(done, n, n, 0), done[n * n :]
+
+
+def pieces(program: Program, values: Mapping[str, Any], slope_terms: int) -> list[str]:
+    """A stage in all lanes: `NAME_update` and what it calls."""
+    assert program.path is not None
+    assert program.path_slopes is not None
+    path, slopes, n = program.path, program.path_slopes, program.dimension
+    every = [*path.series, *slopes.series]
+    base = len(path.series)
+    own = {
+        **values,
+        "terms": TERMS,
+        "slope_terms": slope_terms,
+        "slope_accuracy": repr(SLOPE_ACCURACY),
+        "series": base,
+        "slope_series": max(1, len(slopes.series)),
+        "fixed": max(1, len(path.fixed)),
+        "slope_fixed": max(1, len(slopes.fixed)),
+        "n_twice": 2 * n,
+        "n2_twice": 2 * n * n,
+        "slopes": ", ".join(map(str, path.slopes)),
+        "follow": [
+            ("follow", "the series that follow from those of the coordinates", *_rules(program, every, range(n, base))),
+            ("follow_slopes", "the further series", *_rules(program, every, range(base, len(every)))),
+        ],
+        "vary": _variation(program, slopes.jacobian),
+        "source": _source(program, slopes),
+    }
+    return [render("c", f"{template}.c", own) for template in TEMPLATES]
+
+
+def _resolved(
+    series: Sequence[Series],
+    fixed: Sequence[Expression],
+    known: Mapping[str, Expression],
+    first: int = 0,
+    first_fixed: int = 0,
+) -> tuple[tuple[Expression, ...], tuple[Expression, ...]]:
+    """The first coefficients as expressions in what is known, with no symbols for one another."""
+    found = dict(known) | {f"f:{first_fixed + i}": e for i, e in enumerate(fixed)}
+    values = []
+    for i, q in enumerate(series):
+        (value,) = substitute([q.first], found)
+        found[f"s:{first + i}"] = value
+        values.append(value)
+    return tuple(values), tuple(fixed)
+
+
+def _place(program: Program, i: int) -> str:
+    """The series of a number."""
+    assert program.path is not None
+    base = len(program.path.series)
+    return f"e->s[{i}]" if i < base else f"e->slope[{i - base}]"
+
+
+def _printer(program: Program) -> Any:
+    assert program.path is not None
+    assert program.path_slopes is not None
+    path, slopes = program.path, program.path_slopes
+    scope = Scope(())
+    for i, c in enumerate(program.coordinates):
+        scope.bind(momentum(c), f"e->p[{i}][lane]")
+    for i in range(program.coefficients):
+        scope.bind(f"c:{i}", f"coef[{i}][lane]")
+    for i in range(len(path.series) + len(slopes.series)):
+        scope.bind(f"s:{i}", f"{_place(program, i)}[0][lane]")
+    for i in range(len(path.fixed) + len(slopes.fixed)):
+        own = i - len(path.fixed)
+        scope.bind(f"f:{i}", f"e->fixed[{i}][lane]" if own < 0 else f"e->slope_fixed[{own}][lane]")
+    show = printer(scope, FUNCTIONS)
+    return lambda e: show(expand_powers([e])[0])
+
+
+def _rules(program: Program, every: Sequence[Series], numbers: range) -> tuple[int, list[str], list[str]]:
+    """Coefficient k ≥ 1 of the series of these numbers: the count of sums over orders, loops over lanes that add what
+    orders j and k − j contribute to these, and loops for the rest, which may need coefficients of order k."""
+    between: list[str] = []
+    ends: list[str] = []
+    show = _printer(program)
+    for i in numbers:
+        q, parts = every[i], []
+        for t in q.terms:
+            weight, share, end = _orders(program, t)
+            parts.append(f"{share}sum[{len(between)}][lane] + {end}")
+            a, b = _place(program, t.a), _place(program, t.b)
+            between.append(f"sum[{len(between)}][lane] += {weight}{a}[j][lane] * {b}[k - j][lane];")
+        value = " + ".join(parts) or _linear(program, q, show) or "0.0"
+        if q.divisor is not None:
+            value = f"({value}) / {_place(program, q.divisor)}[0][lane]"
+        ends.append(f"{_place(program, i)}[k][lane] = {value};")
+    return max(1, len(between)), _loops(program, between), _loops(program, ends)
+
+
+def _loops(program: Program, statements: Sequence[str]) -> list[str]:
+    """Statements for one lane in loops over all, none of which is too long."""
+    lines: list[str] = []
+    for start in range(0, len(statements), LONGEST_LOOP):
+        lines += [each_lane(program), f"for (int lane = 0; lane < {program.name}_LANES; ++lane) {{"]
+        lines += [f"    {line}" for line in statements[start : start + LONGEST_LOOP]]
+        lines.append("}")
+    return lines
+
+
+def _orders(program: Program, t: Term) -> tuple[str, str, str]:
+    """Of one sum over orders j (see `Term`): the weight of a_j b_{k-j}, what the sum is multiplied by, the terms that
+    it leaves out, with a coefficient of order 0."""
+    a, b = _place(program, t.a), _place(program, t.b)
+    last = f"{a}[k][lane] * {b}[0][lane]"
+    match t.kind:
+        case "product" if t.a == t.b:
+            return "", "", f"2.0 * {last}"
+        case "product":
+            return "", "", f"{a}[0][lane] * {b}[k][lane] + {last}"
+        case "chain":
+            return "j * ", "share * ", last
+    r = f"{t.exponent.numerator}.0 / {t.exponent.denominator}.0"
+    return f"(({r} + 1.0) * j - k) * ", "share * ", f"{r} * {last}"
+
+
+def _linear(program: Program, q: Series, show: Any) -> str:
+    text = ""
+    for index, factor in q.linear:
+        value = f"{_place(program, index)}[k][lane]"
+        if factor.is_number and abs(factor.value) == 1:
+            sign = "-" if factor.value < 0 else "+"
+        else:
+            sign, value = "+", f"{show(factor)} * {value}"
+        text += f" {sign} {value}" if text else value if sign == "+" else f"-{value}"
+    return text
+
+
+def _variation(program: Program, jacobian: Sequence[Entry]) -> list[str]:
+    """The product of ∂(π p)/∂m and the derivatives so far, to be added."""
+    n = program.dimension
+    lines = [f"const double a{e.row}{e.column} = {_place(program, e.series)}[j][lane];" for e in jacobian]
+    for row in range(n):
+        columns = [e.column for e in jacobian if e.row == row]
+        for k in range(2 * n if columns else 0):
+            products = " + ".join(f"a{row}{c} * from[{c * 2 * n + k}][lane]" for c in columns)
+            lines.append(f"to[{row * 2 * n + k}][lane] += {products};")
+    return lines or ["(void)from, (void)to, (void)j;"]
+
+
+def _source(program: Program, slopes: PathSlopes) -> list[str]:
+    """What order k of ∂(π p)/∂m contributes by itself, and half of π: the derivative along p is that of ½π(m)p."""
+    n = program.dimension
+    along_m = [(e.row * 2 * n + e.column, "", e) for e in slopes.jacobian]
+    along_p = [(e.row * 2 * n + n + e.column, "0.5 * ", e) for e in slopes.tensor]
+    return [f"to[{i}][lane] += {half}{_place(program, e.series)}[k][lane];" for i, half, e in (*along_m, *along_p)]

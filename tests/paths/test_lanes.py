@@ -1,0 +1,109 @@
+"""Blocks of steps and groups of members on paths: what one lane cannot do is done by single steps."""
+
+import ctypes
+from functools import cache
+
+import numpy as np
+import pytest
+from precise_path import by_paths, compile_paths
+from support import BODY, COMMAND, RawC, compiled
+
+from phigen.compiler import emit
+from phigen.scheme.assemble import MOST_IN_LANES
+from phigen.targets.c import lanes
+
+POLE = "coordinates: [x, y]\npoisson: {brackets: {x: {y: x**2}}}\nhamiltonian: y + x*y/9\n"
+LOGARITHM = "coordinates: [x, y]\npoisson: {brackets: {x: {y: log(x)}}}\nhamiltonian: y - x*y\n"
+ROOT = "coordinates: [x, y, z]\npoisson: {nambu: [z - sqrt(x)]}\nhamiltonian: y**2/2 + z + x*y/4\n"
+KINK = "coordinates: [x, y]\npoisson: {brackets: {x: {y: 1 + abs(x)}}}\nhamiltonian: y + x*y/4\n"
+TURNING = BODY.replace("x1**2/2 + x2**2/4 + x3**2/6", "x1 + x2*x3/50")
+
+#: Text, start, step size, steps; and how far starts of members are apart.
+SYSTEMS = {
+    "pole": (POLE, (0.3, 0.2), 0.05, 48, (0.1, 0.1)),  # some members reach the pole of x' = x², most do not
+    "logarithm": (LOGARITHM, (0.9, 0.1), 0.05, 60, (-0.12, 0.05)),  # the last members start at x < 0
+    "root": (ROOT, (0.9, -0.5, 0.3), 0.05, 24, (-0.07, 0.02, 0.0)),  # x runs into 0
+    "kink": (KINK, (-0.8, 0.3), 0.05, 60, (0.1, 0.0)),  # paths across x = 0, where their series does not converge
+    "turning": (TURNING, (0.2, 0.5, -0.7), 6.0, 40, (0.0, 0.01, 0.0)),  # a turn in each step: more than one piece
+    "turned": (TURNING, (0.2, 0.5, -0.7), 1.0, 60, (0.0, 0.01, 0.0)),  # more terms than an expansion has in lanes
+}
+
+
+@cache
+def system(name):
+    """The compilation of one of these systems."""
+    return compile_paths(SYSTEMS[name][0], 4)
+
+
+def alone(compilation, start, h, steps):
+    """By single steps: the state after those that can be made, their number, and the status of the last."""
+    raw, status = RawC(compilation), 0
+    assert raw.init(start) == 0
+    while status == 0 and raw.counters[0] < steps:
+        status = raw.step(h)
+    return raw.x.copy(), int(raw.counters[0]), status
+
+
+@pytest.mark.parametrize("name", SYSTEMS)
+def test_steps_and_failures_of_blocks_are_those_of_single_steps(name):
+    _, start, h, steps, apart = SYSTEMS[name]
+    compilation = system(name)
+    assert lanes.blocks(compilation.program)
+    for k in (0, 5):
+        begin = np.add(start, k * np.array(apart))
+        x, made, status = alone(compilation, begin, h, steps)
+        raw = RawC(compilation)
+        raw.init(begin)
+        assert raw.integrate(h, steps) == status
+        assert raw.counters[0] == made
+        np.testing.assert_allclose(raw.x, x, rtol=1e-12, atol=1e-13)
+
+
+@pytest.mark.parametrize("members", [1, 11])
+@pytest.mark.parametrize("name", SYSTEMS)
+def test_members_that_fail_leave_their_group_as_they_would_alone(name, members):
+    _, start, h, steps, apart = SYSTEMS[name]
+    compilation = system(name)
+    starts = np.add(start, np.outer(np.arange(members), apart))
+    x, status = np.array(starts.T, order="C"), np.zeros(members, dtype=np.uint8)
+    worst = RawC(compilation).call(
+        "ensemble",
+        ctypes.c_int,
+        None,
+        ctypes.c_void_p(x.ctypes.data),
+        ctypes.c_size_t(members),
+        ctypes.c_double(h),
+        ctypes.c_size_t(steps),
+        ctypes.c_void_p(status.ctypes.data),
+    )
+    expected = [alone(compilation, row, h, steps) for row in starts]
+    assert list(status) == [s for _, _, s in expected]
+    assert worst == next((s for _, _, s in expected if s), 0)
+    near = 1e-9 if name == "pole" else 1e-12  # near the pole round-off grows
+    np.testing.assert_allclose(x.T, [row for row, _, _ in expected], rtol=near, atol=1e-13)
+    if members > 1 and name in ("pole", "logarithm", "root"):
+        assert 0 < np.count_nonzero(status) < members
+
+
+def test_paths_of_few_coordinates_are_followed_in_lanes():
+    for name, few in (("nambu_pendulum", True), ("charged_particle", False)):
+        program = compiled(name).program
+        assert (program.dimension <= MOST_IN_LANES) == few
+        assert lanes.blocks(program) == few
+
+
+def test_paths_where_the_spec_wants_no_lanes_have_no_blocks():
+    text = f"{POLE}solver: {{lanes: false}}\n"
+    with_lanes, without = (emit(compile_paths(t, 4).program, "c", COMMAND)["t.c"] for t in (POLE, text))
+    assert "t_block(" in with_lanes
+    assert "lanes" not in without
+    assert len(without.splitlines()) < 0.4 * len(with_lanes.splitlines())
+
+
+def test_blocks_of_steps_on_paths_keep_casimirs_to_roundoff():
+    compilation = by_paths("rigid_body", 4)
+    raw = RawC(compilation)
+    raw.init((0.1, 1.0, 0.1))
+    assert raw.integrate(0.1, 20_000) == 0
+    assert raw.counters[1] < 2.2 * raw.counters[0]  # passes over blocks, no longer solves step by step
+    assert abs(raw.x @ raw.x - 1.02) < 2e-15
