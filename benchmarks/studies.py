@@ -140,9 +140,10 @@ def ensembles(effort: Effort) -> list[dict[str, Any]]:
     libraries: dict[str, tuple[ctypes.CDLL, tuple[float, ...]]] = {
         "RK4 in C, 8 members at once": (vector_rk4(problem), (0.1, 0.05, 0.025, 0.0125))
     }
-    for order in (4, 6, 8):
-        built = build_phigen(problem.spec(order, "gauge auto"))
-        libraries[f"phigen {order}, gauge auto"] = (built.library, (0.5, 0.25, 0.125))
+    for method, steps in (("gauge auto", (0.5, 0.25, 0.125)), ("splitting", (1.0, 0.5, 0.25, 0.125))):
+        for order in (4, 6, 8):
+            built = build_phigen(problem.spec(order, method))
+            libraries[f"phigen {order}, {method}"] = (built.library, steps)
     rows: dict[tuple[str, float], dict[str, Any]] = {}
     for _ in range(min(effort.rounds, 3)):
         for name, (library, steps) in libraries.items():

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 81ad646bea34ab71236419053cc73dccd600e6fa3aa59a87b424d3d053897ded
+ * body-sha256: 9b8c689087298e6f25a2e6ad70dcbb31395171680231772e9580a96a4581d54e
  */
 #include "pendulum_euler.h"
 
@@ -319,6 +319,7 @@ pendulum_euler_APART static pendulum_euler_status pendulum_euler_group_run(
         group.left[m] = steps;
     }
     int active = pendulum_euler_set_step(&group.s, h) == pendulum_euler_OK;
+    if (count == 1) active = 0; /* one alone is quicker without lanes */
     for (size_t left = steps; left > 0 && active > 0;) {
         const int stretch = left < pendulum_euler_STRETCH ? (int)left : pendulum_euler_STRETCH;
         active = pendulum_euler_group_steps(&group, stretch);

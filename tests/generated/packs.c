@@ -127,8 +127,8 @@ static void those_who_leave_go_on(void)
 
 int main(void)
 {
-    const int counts[] = { 1, 7, 8, 19, MOST };
-    for (int k = 0; k < 5; ++k) members_equal_steps(counts[k], STEP, 70, ULPS);
+    const int counts[] = { 1, 2, 7, 8, 19, MOST };
+    for (int k = 0; k < 6; ++k) members_equal_steps(counts[k], STEP, 70, ULPS);
     members_equal_steps(19, -STEP, 32, ULPS);
     members_equal_steps(19, FAR * STEP, 1, 100);
     members_equal_steps(9, STEP, 0, 0.0);
