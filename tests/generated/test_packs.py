@@ -66,6 +66,16 @@ def test_members_of_explicit_steps_equal_single_trajectories(kind, tmp_path):
     exercise(compilation, tmp_path, "-O1", ulps, 1)
 
 
+@pytest.mark.parametrize("name", ["kepler", "toda3_quadratic"])
+@pytest.mark.parametrize("compiler", ["gcc", "clang"])
+def test_packs_compile_without_a_warning_where_loops_cannot_be_vectorised(name, compiler, tmp_path):
+    """Not even by -Wpass-failed of clang, which forgets where a loop was when OpenMP moves it into another function."""
+    write(tmp_path, emit(compiled(name, 4, "splitting").program, "c", COMMAND, single_file=True))
+    strict = "-std=c99 -Wall -Wextra -Wpedantic -Wconversion -Wdouble-promotion -Wshadow -Werror".split()
+    for flags in (["-O2", "-fopenmp"], ["-O3", "-march=native"]):
+        run([tool(compiler), *strict, *flags, "-c", f"{name}.c", "-o", "packs.o"], tmp_path)
+
+
 #: Prints the status and the bits of all members, one of which has no state.
 THREADS = """
 #include <stdio.h>
