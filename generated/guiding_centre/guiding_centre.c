@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 7315229ebc17bebd2f41750e6f942b5cce7d4190230a7d2ad386f59abfdfed70
+ * body-sha256: 4fb5616fef5d5700ef2bdf7b440181898cd37d80b9c3777449d61f8d8241dfcd
  */
 #include "guiding_centre.h"
 
@@ -753,8 +753,7 @@ typedef struct {
 typedef struct {
     guiding_centre_lanes y[4], displacement[4], increment[4], residual[4];
     guiding_centre_lanes inverse[16], slope[16], gain[16];
-    guiding_centre_lanes at[4], middle[4]; /* y when it was last evaluated, the middle of the path less y */
-    guiding_centre_lanes sway[16]; /* the derivative of middle along y */
+    guiding_centre_lanes middle[4]; /* of the path, less y */
     guiding_centre_lanes alpha_y[16], increment_y[16]; /* of alpha and beta - alpha, with p held fixed */
 } guiding_centre_model;
 
@@ -1316,18 +1315,16 @@ static void guiding_centre_slope_values_lanes(guiding_centre_lanes coef[restrict
     guiding_centre_slope_values_lanes_part2(coef, p, value, fixed, slope, slope_fixed, work);
 }
 
-/* guiding_centre_along_mean_lanes_part1 (part 1 of 2) */
-guiding_centre_APART static void guiding_centre_along_mean_lanes_part1(guiding_centre_lanes even[restrict 32],
-                                                                       guiding_centre_lanes odd[restrict 32],
-                                                                       guiding_centre_lanes mean[restrict 32],
-                                                                       guiding_centre_lanes hessian[restrict 16],
-                                                                       guiding_centre_lanes alpha_y[restrict 16],
-                                                                       guiding_centre_lanes increment_y[restrict 16],
-                                                                       guiding_centre_lanes jacobian[restrict 16],
-                                                                       guiding_centre_lanes increment_jacobian[restrict 16],
-                                                                       guiding_centre_lanes sway[restrict 16],
-                                                                       guiding_centre_lanes reciprocal[restrict 4],
-                                                                       guiding_centre_lanes work[restrict 16])
+/* guiding_centre_along_mean in all lanes. */
+static void guiding_centre_along_mean_lanes(guiding_centre_lanes even[restrict 32],
+                                            guiding_centre_lanes odd[restrict 32],
+                                            guiding_centre_lanes mean[restrict 32],
+                                            guiding_centre_lanes hessian[restrict 16],
+                                            guiding_centre_lanes alpha_y[restrict 16],
+                                            guiding_centre_lanes increment_y[restrict 16],
+                                            guiding_centre_lanes jacobian[restrict 16],
+                                            guiding_centre_lanes increment_jacobian[restrict 16],
+                                            guiding_centre_lanes reciprocal[restrict 4])
 {
     guiding_centre_EACH_LANE
     for (int lane = 0; lane < guiding_centre_LANES; ++lane) {
@@ -1389,95 +1386,82 @@ guiding_centre_APART static void guiding_centre_along_mean_lanes_part1(guiding_c
         const double t56 = hessian[12][lane] * mean[23][lane] + hessian[8][lane] * mean[22][lane] + (hessian[4][lane] * mean[21][lane] + hessian[0][lane] * mean[20][lane]);
         const double t57 = hessian[8][lane] * mean[14][lane] + hessian[12][lane] * mean[15][lane] + (hessian[4][lane] * mean[13][lane] + hessian[0][lane] * mean[12][lane]);
         const double t58 = 1.0 - (hessian[0][lane] * mean[4][lane] + hessian[4][lane] * mean[5][lane] + (hessian[8][lane] * mean[6][lane] + hessian[12][lane] * mean[7][lane]));
-        work[14][lane] = t55 * t37 - t56 * t34 - (t57 * t30 + t58 * t23);
-        work[15][lane] = t58 * t20 - t57 * t29 + (t55 * t38 - t56 * t33);
-        work[12][lane] = t56 * t32 - t55 * t18 + (t58 * t19 - t57 * t28);
-        work[13][lane] = t57 * t31 + t58 * t26 + (t55 * t36 - t56 * t35);
-        const double t63 = hessian[8][lane] * t51 + hessian[12][lane] * t52 + (hessian[0][lane] * t53 + hessian[4][lane] * t54) + (t21 * work[14][lane] + t1 * work[15][lane] + (t24 * work[12][lane] + t25 * work[13][lane]));
+        const double t59 = t55 * t37 - t56 * t34 - (t57 * t30 + t58 * t23);
+        const double t60 = t58 * t20 - t57 * t29 + (t55 * t38 - t56 * t33);
+        const double t61 = t56 * t32 - t55 * t18 + (t58 * t19 - t57 * t28);
+        const double t62 = t57 * t31 + t58 * t26 + (t55 * t36 - t56 * t35);
+        const double t63 = hessian[8][lane] * t51 + hessian[12][lane] * t52 + (hessian[0][lane] * t53 + hessian[4][lane] * t54) + (t21 * t59 + t1 * t60 + (t24 * t61 + t25 * t62));
         const double t64 = hessian[5][lane] * mean[21][lane] + hessian[1][lane] * mean[20][lane] + (hessian[9][lane] * mean[22][lane] + hessian[13][lane] * mean[23][lane]);
         const double t65 = hessian[5][lane] * mean[29][lane] + hessian[1][lane] * mean[28][lane] + (hessian[13][lane] * mean[31][lane] + hessian[9][lane] * mean[30][lane]);
         const double t66 = 1.0 - (hessian[1][lane] * mean[12][lane] + hessian[5][lane] * mean[13][lane] + (hessian[13][lane] * mean[15][lane] + hessian[9][lane] * mean[14][lane]));
         const double t67 = hessian[13][lane] * mean[7][lane] + hessian[9][lane] * mean[6][lane] + (hessian[1][lane] * mean[4][lane] + hessian[5][lane] * mean[5][lane]);
-        work[0][lane] = t64 * t32 - t65 * t18 + (t66 * t28 - t67 * t19);
-        work[1][lane] = t65 * t36 - t64 * t35 - (t66 * t31 + t67 * t26);
-        work[2][lane] = t66 * t29 - t67 * t20 + (t65 * t38 - t64 * t33);
-        work[3][lane] = t65 * t37 - t64 * t34 + (t67 * t23 + t66 * t30);
-        const double t72 = hessian[13][lane] * t52 + hessian[9][lane] * t51 + (hessian[5][lane] * t54 + hessian[1][lane] * t53) + (t24 * work[0][lane] + t25 * work[1][lane] + (t1 * work[2][lane] + t21 * work[3][lane]));
+        const double t68 = t64 * t32 - t65 * t18 + (t66 * t28 - t67 * t19);
+        const double t69 = t65 * t36 - t64 * t35 - (t66 * t31 + t67 * t26);
+        const double t70 = t66 * t29 - t67 * t20 + (t65 * t38 - t64 * t33);
+        const double t71 = t65 * t37 - t64 * t34 + (t67 * t23 + t66 * t30);
+        const double t72 = hessian[13][lane] * t52 + hessian[9][lane] * t51 + (hessian[5][lane] * t54 + hessian[1][lane] * t53) + (t24 * t68 + t25 * t69 + (t1 * t70 + t21 * t71));
         const double t73 = hessian[2][lane] * mean[28][lane] + hessian[6][lane] * mean[29][lane] + (hessian[14][lane] * mean[31][lane] + hessian[10][lane] * mean[30][lane]);
         const double t74 = 1.0 - (hessian[2][lane] * mean[20][lane] + hessian[6][lane] * mean[21][lane] + (hessian[10][lane] * mean[22][lane] + hessian[14][lane] * mean[23][lane]));
         const double t75 = hessian[2][lane] * mean[4][lane] + hessian[6][lane] * mean[5][lane] + (hessian[14][lane] * mean[7][lane] + hessian[10][lane] * mean[6][lane]);
         const double t76 = hessian[6][lane] * mean[13][lane] + hessian[2][lane] * mean[12][lane] + (hessian[14][lane] * mean[15][lane] + hessian[10][lane] * mean[14][lane]);
-        work[6][lane] = t73 * t37 + t74 * t34 + (t75 * t23 - t76 * t30);
-        work[7][lane] = t73 * t38 + t74 * t33 - (t76 * t29 + t75 * t20);
-        work[4][lane] = t73 * t36 + t74 * t35 + (t76 * t31 - t75 * t26);
-        work[5][lane] = t76 * t28 + t75 * t19 + (t73 * t18 + t74 * t32);
-        const double t81 = hessian[10][lane] * t51 + hessian[14][lane] * t52 + (hessian[2][lane] * t53 + hessian[6][lane] * t54) + (t21 * work[6][lane] + t1 * work[7][lane] + (t25 * work[4][lane] - t24 * work[5][lane]));
+        const double t77 = t73 * t37 + t74 * t34 + (t75 * t23 - t76 * t30);
+        const double t78 = t73 * t38 + t74 * t33 - (t76 * t29 + t75 * t20);
+        const double t79 = t73 * t36 + t74 * t35 + (t76 * t31 - t75 * t26);
+        const double t80 = t76 * t28 + t75 * t19 + (t73 * t18 + t74 * t32);
+        const double t81 = hessian[10][lane] * t51 + hessian[14][lane] * t52 + (hessian[2][lane] * t53 + hessian[6][lane] * t54) + (t21 * t77 + t1 * t78 + (t25 * t79 - t24 * t80));
         const double t82 = 1.0 - (hessian[11][lane] * mean[30][lane] + hessian[15][lane] * mean[31][lane] + (hessian[3][lane] * mean[28][lane] + hessian[7][lane] * mean[29][lane]));
         const double t83 = hessian[11][lane] * mean[22][lane] + hessian[15][lane] * mean[23][lane] + (hessian[7][lane] * mean[21][lane] + hessian[3][lane] * mean[20][lane]);
         const double t84 = hessian[11][lane] * mean[6][lane] + hessian[15][lane] * mean[7][lane] + (hessian[3][lane] * mean[4][lane] + hessian[7][lane] * mean[5][lane]);
         const double t85 = hessian[11][lane] * mean[14][lane] + hessian[15][lane] * mean[15][lane] + (hessian[3][lane] * mean[12][lane] + hessian[7][lane] * mean[13][lane]);
-        work[8][lane] = t82 * t18 + t83 * t32 - (t84 * t19 + t85 * t28);
-        work[9][lane] = t85 * t31 - t84 * t26 - (t82 * t36 + t83 * t35);
-        work[10][lane] = t84 * t23 - t85 * t30 - (t82 * t37 + t83 * t34);
-        work[11][lane] = t82 * t38 + t83 * t33 + (t84 * t20 + t85 * t29);
-        const double t90 = hessian[3][lane] * t53 + hessian[7][lane] * t54 + (hessian[11][lane] * t51 + hessian[15][lane] * t52) + (t24 * work[8][lane] + t25 * work[9][lane] + (t21 * work[10][lane] - t1 * work[11][lane]));
+        const double t86 = t82 * t18 + t83 * t32 - (t84 * t19 + t85 * t28);
+        const double t87 = t85 * t31 - t84 * t26 - (t82 * t36 + t83 * t35);
+        const double t88 = t84 * t23 - t85 * t30 - (t82 * t37 + t83 * t34);
+        const double t89 = t82 * t38 + t83 * t33 + (t84 * t20 + t85 * t29);
+        const double t90 = hessian[3][lane] * t53 + hessian[7][lane] * t54 + (hessian[11][lane] * t51 + hessian[15][lane] * t52) + (t24 * t86 + t25 * t87 + (t21 * t88 - t1 * t89));
         const double t91 = even[13][lane] - odd[13][lane];
         const double t92 = even[12][lane] - odd[12][lane];
         const double t93 = even[15][lane] - odd[15][lane];
         const double t94 = even[14][lane] - odd[14][lane];
-        const double t95 = hessian[4][lane] * t91 + hessian[0][lane] * t92 + (hessian[12][lane] * t93 + hessian[8][lane] * t94) + (t39 * work[12][lane] + t40 * work[13][lane] + (t41 * work[15][lane] + t42 * work[14][lane]));
-        const double t96 = hessian[9][lane] * t94 + hessian[13][lane] * t93 + (hessian[1][lane] * t92 + hessian[5][lane] * t91) + (t39 * work[0][lane] + t40 * work[1][lane] + (t41 * work[2][lane] + t42 * work[3][lane]));
-        const double t97 = hessian[10][lane] * t94 + hessian[14][lane] * t93 + (hessian[6][lane] * t91 + hessian[2][lane] * t92) + (t40 * work[4][lane] - t39 * work[5][lane] + (t42 * work[6][lane] + t41 * work[7][lane]));
-        const double t98 = hessian[15][lane] * t93 + hessian[11][lane] * t94 + (hessian[7][lane] * t91 + hessian[3][lane] * t92) + (t39 * work[8][lane] + t40 * work[9][lane] + (t42 * work[10][lane] - t41 * work[11][lane]));
+        const double t95 = hessian[4][lane] * t91 + hessian[0][lane] * t92 + (hessian[12][lane] * t93 + hessian[8][lane] * t94) + (t39 * t61 + t40 * t62 + (t41 * t60 + t42 * t59));
+        const double t96 = hessian[9][lane] * t94 + hessian[13][lane] * t93 + (hessian[1][lane] * t92 + hessian[5][lane] * t91) + (t39 * t68 + t40 * t69 + (t41 * t70 + t42 * t71));
+        const double t97 = hessian[10][lane] * t94 + hessian[14][lane] * t93 + (hessian[6][lane] * t91 + hessian[2][lane] * t92) + (t40 * t79 - t39 * t80 + (t42 * t77 + t41 * t78));
+        const double t98 = hessian[15][lane] * t93 + hessian[11][lane] * t94 + (hessian[7][lane] * t91 + hessian[3][lane] * t92) + (t39 * t86 + t40 * t87 + (t42 * t88 - t41 * t89));
         const double t99 = even[21][lane] - odd[21][lane];
         const double t100 = even[20][lane] - odd[20][lane];
         const double t101 = even[22][lane] - odd[22][lane];
         const double t102 = even[23][lane] - odd[23][lane];
-        const double t103 = hessian[4][lane] * t99 + hessian[0][lane] * t100 + (hessian[8][lane] * t101 + hessian[12][lane] * t102) + (t43 * work[12][lane] + t44 * work[13][lane] + (t45 * work[15][lane] + t46 * work[14][lane]));
-        const double t104 = hessian[9][lane] * t101 + hessian[13][lane] * t102 + (hessian[5][lane] * t99 + hessian[1][lane] * t100) + (t43 * work[0][lane] + t44 * work[1][lane] + (t46 * work[3][lane] + t45 * work[2][lane]));
-        const double t105 = hessian[10][lane] * t101 + hessian[14][lane] * t102 + (hessian[6][lane] * t99 + hessian[2][lane] * t100) + (t44 * work[4][lane] - t43 * work[5][lane] + (t45 * work[7][lane] + t46 * work[6][lane]));
-        const double t106 = hessian[3][lane] * t100 + hessian[7][lane] * t99 + (hessian[11][lane] * t101 + hessian[15][lane] * t102) + (t43 * work[8][lane] + t44 * work[9][lane] + (t46 * work[10][lane] - t45 * work[11][lane]));
+        const double t103 = hessian[4][lane] * t99 + hessian[0][lane] * t100 + (hessian[8][lane] * t101 + hessian[12][lane] * t102) + (t43 * t61 + t44 * t62 + (t45 * t60 + t46 * t59));
+        const double t104 = hessian[9][lane] * t101 + hessian[13][lane] * t102 + (hessian[5][lane] * t99 + hessian[1][lane] * t100) + (t43 * t68 + t44 * t69 + (t46 * t71 + t45 * t70));
+        const double t105 = hessian[10][lane] * t101 + hessian[14][lane] * t102 + (hessian[6][lane] * t99 + hessian[2][lane] * t100) + (t44 * t79 - t43 * t80 + (t45 * t78 + t46 * t77));
+        const double t106 = hessian[3][lane] * t100 + hessian[7][lane] * t99 + (hessian[11][lane] * t101 + hessian[15][lane] * t102) + (t43 * t86 + t44 * t87 + (t46 * t88 - t45 * t89));
         const double t107 = even[29][lane] - odd[29][lane];
         const double t108 = even[28][lane] - odd[28][lane];
         const double t109 = even[30][lane] - odd[30][lane];
         const double t110 = even[31][lane] - odd[31][lane];
-        const double t111 = hessian[4][lane] * t107 + hessian[0][lane] * t108 + (hessian[8][lane] * t109 + hessian[12][lane] * t110) + (t49 * work[12][lane] + t50 * work[13][lane] + (t47 * work[15][lane] + t48 * work[14][lane]));
-        const double t112 = hessian[9][lane] * t109 + hessian[13][lane] * t110 + (hessian[5][lane] * t107 + hessian[1][lane] * t108) + (t47 * work[2][lane] + t48 * work[3][lane] + (t49 * work[0][lane] + t50 * work[1][lane]));
-        const double t113 = hessian[10][lane] * t109 + hessian[14][lane] * t110 + (hessian[6][lane] * t107 + hessian[2][lane] * t108) + (t50 * work[4][lane] - t49 * work[5][lane] + (t47 * work[7][lane] + t48 * work[6][lane]));
-        const double t114 = hessian[3][lane] * t108 + hessian[7][lane] * t107 + (hessian[15][lane] * t110 + hessian[11][lane] * t109) + (t48 * work[10][lane] - t47 * work[11][lane] + (t49 * work[8][lane] + t50 * work[9][lane]));
-        const double t115 = 2.0 * (hessian[0][lane] * odd[4][lane]) + 2.0 * (hessian[4][lane] * odd[5][lane]) + (2.0 * (hessian[8][lane] * odd[6][lane]) + 2.0 * (hessian[12][lane] * odd[7][lane])) + (2.0 * (odd[0][lane] * work[15][lane]) + 2.0 * (odd[1][lane] * work[14][lane]) + (2.0 * (odd[3][lane] * work[12][lane]) + 2.0 * (odd[2][lane] * work[13][lane])));
-        const double t116 = 2.0 * (hessian[9][lane] * odd[6][lane]) + 2.0 * (hessian[13][lane] * odd[7][lane]) + (2.0 * (hessian[1][lane] * odd[4][lane]) + 2.0 * (hessian[5][lane] * odd[5][lane])) + (2.0 * (odd[0][lane] * work[2][lane]) + 2.0 * (odd[1][lane] * work[3][lane]) + (2.0 * (odd[3][lane] * work[0][lane]) + 2.0 * (odd[2][lane] * work[1][lane])));
-        const double t117 = 2.0 * (hessian[2][lane] * odd[4][lane]) + 2.0 * (hessian[6][lane] * odd[5][lane]) + (2.0 * (hessian[14][lane] * odd[7][lane]) + 2.0 * (hessian[10][lane] * odd[6][lane])) + (2.0 * (odd[2][lane] * work[4][lane]) - 2.0 * (odd[3][lane] * work[5][lane]) + (2.0 * (odd[1][lane] * work[6][lane]) + 2.0 * (odd[0][lane] * work[7][lane])));
-        const double t118 = 2.0 * (hessian[3][lane] * odd[4][lane]) + 2.0 * (hessian[7][lane] * odd[5][lane]) + (2.0 * (hessian[15][lane] * odd[7][lane]) + 2.0 * (hessian[11][lane] * odd[6][lane])) + (2.0 * (odd[1][lane] * work[10][lane]) - 2.0 * (odd[0][lane] * work[11][lane]) + (2.0 * (odd[3][lane] * work[8][lane]) + 2.0 * (odd[2][lane] * work[9][lane])));
-        const double t119 = 2.0 * (hessian[0][lane] * odd[12][lane]) + 2.0 * (hessian[4][lane] * odd[13][lane]) + (2.0 * (hessian[8][lane] * odd[14][lane]) + 2.0 * (hessian[12][lane] * odd[15][lane])) + (2.0 * (odd[11][lane] * work[12][lane]) + 2.0 * (odd[10][lane] * work[13][lane]) + (2.0 * (odd[9][lane] * work[14][lane]) + 2.0 * (odd[8][lane] * work[15][lane])));
-        const double t120 = 2.0 * (hessian[9][lane] * odd[14][lane]) + 2.0 * (hessian[13][lane] * odd[15][lane]) + (2.0 * (hessian[5][lane] * odd[13][lane]) + 2.0 * (hessian[1][lane] * odd[12][lane])) + (2.0 * (odd[11][lane] * work[0][lane]) + 2.0 * (odd[10][lane] * work[1][lane]) + (2.0 * (odd[8][lane] * work[2][lane]) + 2.0 * (odd[9][lane] * work[3][lane])));
-        const double t121 = 2.0 * (hessian[2][lane] * odd[12][lane]) + 2.0 * (hessian[6][lane] * odd[13][lane]) + (2.0 * (hessian[14][lane] * odd[15][lane]) + 2.0 * (hessian[10][lane] * odd[14][lane])) + (2.0 * (odd[10][lane] * work[4][lane]) - 2.0 * (odd[11][lane] * work[5][lane]) + (2.0 * (odd[8][lane] * work[7][lane]) + 2.0 * (odd[9][lane] * work[6][lane])));
-        const double t122 = 2.0 * (hessian[7][lane] * odd[13][lane]) + 2.0 * (hessian[3][lane] * odd[12][lane]) + (2.0 * (hessian[11][lane] * odd[14][lane]) + 2.0 * (hessian[15][lane] * odd[15][lane])) + (2.0 * (odd[9][lane] * work[10][lane]) - 2.0 * (odd[8][lane] * work[11][lane]) + (2.0 * (odd[11][lane] * work[8][lane]) + 2.0 * (odd[10][lane] * work[9][lane])));
-        const double t123 = 2.0 * (hessian[12][lane] * odd[23][lane]) + 2.0 * (hessian[8][lane] * odd[22][lane]) + (2.0 * (hessian[4][lane] * odd[21][lane]) + 2.0 * (hessian[0][lane] * odd[20][lane])) + (2.0 * (odd[19][lane] * work[12][lane]) + 2.0 * (odd[18][lane] * work[13][lane]) + (2.0 * (odd[16][lane] * work[15][lane]) + 2.0 * (odd[17][lane] * work[14][lane])));
-        reciprocal[0][lane] = t2;
-        reciprocal[1][lane] = t4;
-        reciprocal[2][lane] = t10;
-        reciprocal[3][lane] = t18;
+        const double t111 = hessian[4][lane] * t107 + hessian[0][lane] * t108 + (hessian[8][lane] * t109 + hessian[12][lane] * t110) + (t49 * t61 + t50 * t62 + (t47 * t60 + t48 * t59));
+        const double t112 = hessian[9][lane] * t109 + hessian[13][lane] * t110 + (hessian[5][lane] * t107 + hessian[1][lane] * t108) + (t47 * t70 + t48 * t71 + (t49 * t68 + t50 * t69));
+        const double t113 = hessian[10][lane] * t109 + hessian[14][lane] * t110 + (hessian[6][lane] * t107 + hessian[2][lane] * t108) + (t50 * t79 - t49 * t80 + (t47 * t78 + t48 * t77));
+        const double t114 = hessian[3][lane] * t108 + hessian[7][lane] * t107 + (hessian[15][lane] * t110 + hessian[11][lane] * t109) + (t48 * t88 - t47 * t89 + (t49 * t86 + t50 * t87));
+        const double t115 = 2.0 * (hessian[0][lane] * odd[4][lane]) + 2.0 * (hessian[4][lane] * odd[5][lane]) + (2.0 * (hessian[8][lane] * odd[6][lane]) + 2.0 * (hessian[12][lane] * odd[7][lane])) + (2.0 * (odd[0][lane] * t60) + 2.0 * (odd[1][lane] * t59) + (2.0 * (odd[3][lane] * t61) + 2.0 * (odd[2][lane] * t62)));
+        const double t116 = 2.0 * (hessian[9][lane] * odd[6][lane]) + 2.0 * (hessian[13][lane] * odd[7][lane]) + (2.0 * (hessian[1][lane] * odd[4][lane]) + 2.0 * (hessian[5][lane] * odd[5][lane])) + (2.0 * (odd[0][lane] * t70) + 2.0 * (odd[1][lane] * t71) + (2.0 * (odd[3][lane] * t68) + 2.0 * (odd[2][lane] * t69)));
+        const double t117 = 2.0 * (hessian[2][lane] * odd[4][lane]) + 2.0 * (hessian[6][lane] * odd[5][lane]) + (2.0 * (hessian[14][lane] * odd[7][lane]) + 2.0 * (hessian[10][lane] * odd[6][lane])) + (2.0 * (odd[2][lane] * t79) - 2.0 * (odd[3][lane] * t80) + (2.0 * (odd[1][lane] * t77) + 2.0 * (odd[0][lane] * t78)));
+        const double t118 = 2.0 * (hessian[3][lane] * odd[4][lane]) + 2.0 * (hessian[7][lane] * odd[5][lane]) + (2.0 * (hessian[15][lane] * odd[7][lane]) + 2.0 * (hessian[11][lane] * odd[6][lane])) + (2.0 * (odd[1][lane] * t88) - 2.0 * (odd[0][lane] * t89) + (2.0 * (odd[3][lane] * t86) + 2.0 * (odd[2][lane] * t87)));
+        const double t119 = 2.0 * (hessian[0][lane] * odd[12][lane]) + 2.0 * (hessian[4][lane] * odd[13][lane]) + (2.0 * (hessian[8][lane] * odd[14][lane]) + 2.0 * (hessian[12][lane] * odd[15][lane])) + (2.0 * (odd[11][lane] * t61) + 2.0 * (odd[10][lane] * t62) + (2.0 * (odd[9][lane] * t59) + 2.0 * (odd[8][lane] * t60)));
+        const double t120 = 2.0 * (hessian[9][lane] * odd[14][lane]) + 2.0 * (hessian[13][lane] * odd[15][lane]) + (2.0 * (hessian[5][lane] * odd[13][lane]) + 2.0 * (hessian[1][lane] * odd[12][lane])) + (2.0 * (odd[11][lane] * t68) + 2.0 * (odd[10][lane] * t69) + (2.0 * (odd[8][lane] * t70) + 2.0 * (odd[9][lane] * t71)));
+        const double t121 = 2.0 * (hessian[2][lane] * odd[12][lane]) + 2.0 * (hessian[6][lane] * odd[13][lane]) + (2.0 * (hessian[14][lane] * odd[15][lane]) + 2.0 * (hessian[10][lane] * odd[14][lane])) + (2.0 * (odd[10][lane] * t79) - 2.0 * (odd[11][lane] * t80) + (2.0 * (odd[8][lane] * t78) + 2.0 * (odd[9][lane] * t77)));
+        const double t122 = 2.0 * (hessian[7][lane] * odd[13][lane]) + 2.0 * (hessian[3][lane] * odd[12][lane]) + (2.0 * (hessian[11][lane] * odd[14][lane]) + 2.0 * (hessian[15][lane] * odd[15][lane])) + (2.0 * (odd[9][lane] * t88) - 2.0 * (odd[8][lane] * t89) + (2.0 * (odd[11][lane] * t86) + 2.0 * (odd[10][lane] * t87)));
+        const double t123 = 2.0 * (hessian[12][lane] * odd[23][lane]) + 2.0 * (hessian[8][lane] * odd[22][lane]) + (2.0 * (hessian[4][lane] * odd[21][lane]) + 2.0 * (hessian[0][lane] * odd[20][lane])) + (2.0 * (odd[19][lane] * t61) + 2.0 * (odd[18][lane] * t62) + (2.0 * (odd[16][lane] * t60) + 2.0 * (odd[17][lane] * t59)));
+        const double t124 = 2.0 * (hessian[1][lane] * odd[20][lane]) + 2.0 * (hessian[5][lane] * odd[21][lane]) + (2.0 * (hessian[13][lane] * odd[23][lane]) + 2.0 * (hessian[9][lane] * odd[22][lane])) + (2.0 * (odd[19][lane] * t68) + 2.0 * (odd[18][lane] * t69) + (2.0 * (odd[16][lane] * t70) + 2.0 * (odd[17][lane] * t71)));
+        const double t125 = 2.0 * (hessian[6][lane] * odd[21][lane]) + 2.0 * (hessian[2][lane] * odd[20][lane]) + (2.0 * (hessian[10][lane] * odd[22][lane]) + 2.0 * (hessian[14][lane] * odd[23][lane])) + (2.0 * (odd[18][lane] * t79) - 2.0 * (odd[19][lane] * t80) + (2.0 * (odd[17][lane] * t77) + 2.0 * (odd[16][lane] * t78)));
+        const double t126 = 2.0 * (hessian[15][lane] * odd[23][lane]) + 2.0 * (hessian[11][lane] * odd[22][lane]) + (2.0 * (hessian[3][lane] * odd[20][lane]) + 2.0 * (hessian[7][lane] * odd[21][lane])) + (2.0 * (odd[19][lane] * t86) + 2.0 * (odd[18][lane] * t87) + (2.0 * (odd[17][lane] * t88) - 2.0 * (odd[16][lane] * t89)));
+        const double t127 = 2.0 * (hessian[0][lane] * odd[28][lane]) + 2.0 * (hessian[4][lane] * odd[29][lane]) + (2.0 * (hessian[12][lane] * odd[31][lane]) + 2.0 * (hessian[8][lane] * odd[30][lane])) + (2.0 * (odd[27][lane] * t61) + 2.0 * (odd[26][lane] * t62) + (2.0 * (odd[25][lane] * t59) + 2.0 * (odd[24][lane] * t60)));
+        const double t128 = 2.0 * (hessian[9][lane] * odd[30][lane]) + 2.0 * (hessian[13][lane] * odd[31][lane]) + (2.0 * (hessian[1][lane] * odd[28][lane]) + 2.0 * (hessian[5][lane] * odd[29][lane])) + (2.0 * (odd[27][lane] * t68) + 2.0 * (odd[26][lane] * t69) + (2.0 * (odd[24][lane] * t70) + 2.0 * (odd[25][lane] * t71)));
+        const double t129 = 2.0 * (hessian[10][lane] * odd[30][lane]) + 2.0 * (hessian[14][lane] * odd[31][lane]) + (2.0 * (hessian[2][lane] * odd[28][lane]) + 2.0 * (hessian[6][lane] * odd[29][lane])) + (2.0 * (odd[25][lane] * t77) + 2.0 * (odd[24][lane] * t78) + (2.0 * (odd[26][lane] * t79) - 2.0 * (odd[27][lane] * t80)));
+        const double t130 = 2.0 * (hessian[7][lane] * odd[29][lane]) + 2.0 * (hessian[3][lane] * odd[28][lane]) + (2.0 * (hessian[11][lane] * odd[30][lane]) + 2.0 * (hessian[15][lane] * odd[31][lane])) + (2.0 * (odd[25][lane] * t88) - 2.0 * (odd[24][lane] * t89) + (2.0 * (odd[27][lane] * t86) + 2.0 * (odd[26][lane] * t87)));
         alpha_y[0][lane] = t1 * t20 - t21 * t23 + (t24 * t19 + t25 * t26);
-        increment_y[0][lane] = 2.0 * (odd[0][lane] * t20) - 2.0 * (odd[1][lane] * t23) + (2.0 * (odd[3][lane] * t19) + 2.0 * (odd[2][lane] * t26));
-        increment_y[4][lane] = 2.0 * (odd[11][lane] * t19) + 2.0 * (odd[10][lane] * t26) + (2.0 * (odd[8][lane] * t20) - 2.0 * (odd[9][lane] * t23));
-        increment_y[8][lane] = 2.0 * (odd[19][lane] * t19) + 2.0 * (odd[18][lane] * t26) + (2.0 * (odd[16][lane] * t20) - 2.0 * (odd[17][lane] * t23));
-        increment_y[12][lane] = 2.0 * (odd[24][lane] * t20) - 2.0 * (odd[25][lane] * t23) + (2.0 * (odd[27][lane] * t19) + 2.0 * (odd[26][lane] * t26));
         alpha_y[1][lane] = t1 * t29 + t21 * t30 + (t24 * t28 - t25 * t31);
-        increment_y[1][lane] = 2.0 * (odd[1][lane] * t30) + 2.0 * (odd[0][lane] * t29) + (2.0 * (odd[3][lane] * t28) - 2.0 * (odd[2][lane] * t31));
-        increment_y[5][lane] = 2.0 * (odd[9][lane] * t30) + 2.0 * (odd[8][lane] * t29) + (2.0 * (odd[11][lane] * t28) - 2.0 * (odd[10][lane] * t31));
-        increment_y[9][lane] = 2.0 * (odd[16][lane] * t29) + 2.0 * (odd[17][lane] * t30) + (2.0 * (odd[19][lane] * t28) - 2.0 * (odd[18][lane] * t31));
-        increment_y[13][lane] = 2.0 * (odd[24][lane] * t29) + 2.0 * (odd[25][lane] * t30) + (2.0 * (odd[27][lane] * t28) - 2.0 * (odd[26][lane] * t31));
         alpha_y[2][lane] = t1 * t33 + t21 * t34 + (t25 * t35 - t24 * t32);
-        increment_y[2][lane] = 2.0 * (odd[1][lane] * t34) + 2.0 * (odd[0][lane] * t33) + (2.0 * (odd[2][lane] * t35) - 2.0 * (odd[3][lane] * t32));
-        increment_y[6][lane] = 2.0 * (odd[10][lane] * t35) - 2.0 * (odd[11][lane] * t32) + (2.0 * (odd[8][lane] * t33) + 2.0 * (odd[9][lane] * t34));
-        increment_y[10][lane] = 2.0 * (odd[18][lane] * t35) - 2.0 * (odd[19][lane] * t32) + (2.0 * (odd[16][lane] * t33) + 2.0 * (odd[17][lane] * t34));
-        increment_y[14][lane] = 2.0 * (odd[26][lane] * t35) - 2.0 * (odd[27][lane] * t32) + (2.0 * (odd[24][lane] * t33) + 2.0 * (odd[25][lane] * t34));
         alpha_y[3][lane] = t24 * t18 - t25 * t36 - (t21 * t37 + t1 * t38);
-        increment_y[3][lane] = (-2.0) * (odd[0][lane] * t38) - 2.0 * (odd[1][lane] * t37) + (2.0 * (odd[3][lane] * t18) - 2.0 * (odd[2][lane] * t36));
-        increment_y[7][lane] = (-2.0) * (odd[8][lane] * t38) - 2.0 * (odd[9][lane] * t37) + (2.0 * (odd[11][lane] * t18) - 2.0 * (odd[10][lane] * t36));
-        increment_y[11][lane] = (-2.0) * (odd[16][lane] * t38) - 2.0 * (odd[17][lane] * t37) + (2.0 * (odd[19][lane] * t18) - 2.0 * (odd[18][lane] * t36));
-        increment_y[15][lane] = (-2.0) * (odd[24][lane] * t38) - 2.0 * (odd[25][lane] * t37) + (2.0 * (odd[27][lane] * t18) - 2.0 * (odd[26][lane] * t36));
         alpha_y[4][lane] = t39 * t19 + t40 * t26 + (t41 * t20 - t42 * t23);
         alpha_y[5][lane] = t41 * t29 + t42 * t30 + (t39 * t28 - t40 * t31);
         alpha_y[6][lane] = t42 * t34 + t41 * t33 + (t40 * t35 - t39 * t32);
@@ -1490,25 +1474,25 @@ guiding_centre_APART static void guiding_centre_along_mean_lanes_part1(guiding_c
         alpha_y[13][lane] = t49 * t28 - t50 * t31 + (t48 * t30 + t47 * t29);
         alpha_y[14][lane] = t50 * t35 - t49 * t32 + (t48 * t34 + t47 * t33);
         alpha_y[15][lane] = t49 * t18 - t50 * t36 - (t48 * t37 + t47 * t38);
-        sway[4][lane] = work[14][lane];
-        sway[0][lane] = work[15][lane] - 1.0;
-        sway[12][lane] = work[12][lane];
-        sway[8][lane] = work[13][lane];
+        increment_y[0][lane] = 2.0 * (odd[0][lane] * t20) - 2.0 * (odd[1][lane] * t23) + (2.0 * (odd[3][lane] * t19) + 2.0 * (odd[2][lane] * t26));
+        increment_y[1][lane] = 2.0 * (odd[1][lane] * t30) + 2.0 * (odd[0][lane] * t29) + (2.0 * (odd[3][lane] * t28) - 2.0 * (odd[2][lane] * t31));
+        increment_y[2][lane] = 2.0 * (odd[1][lane] * t34) + 2.0 * (odd[0][lane] * t33) + (2.0 * (odd[2][lane] * t35) - 2.0 * (odd[3][lane] * t32));
+        increment_y[3][lane] = (-2.0) * (odd[0][lane] * t38) - 2.0 * (odd[1][lane] * t37) + (2.0 * (odd[3][lane] * t18) - 2.0 * (odd[2][lane] * t36));
+        increment_y[4][lane] = 2.0 * (odd[11][lane] * t19) + 2.0 * (odd[10][lane] * t26) + (2.0 * (odd[8][lane] * t20) - 2.0 * (odd[9][lane] * t23));
+        increment_y[5][lane] = 2.0 * (odd[9][lane] * t30) + 2.0 * (odd[8][lane] * t29) + (2.0 * (odd[11][lane] * t28) - 2.0 * (odd[10][lane] * t31));
+        increment_y[6][lane] = 2.0 * (odd[10][lane] * t35) - 2.0 * (odd[11][lane] * t32) + (2.0 * (odd[8][lane] * t33) + 2.0 * (odd[9][lane] * t34));
+        increment_y[7][lane] = (-2.0) * (odd[8][lane] * t38) - 2.0 * (odd[9][lane] * t37) + (2.0 * (odd[11][lane] * t18) - 2.0 * (odd[10][lane] * t36));
+        increment_y[8][lane] = 2.0 * (odd[19][lane] * t19) + 2.0 * (odd[18][lane] * t26) + (2.0 * (odd[16][lane] * t20) - 2.0 * (odd[17][lane] * t23));
+        increment_y[9][lane] = 2.0 * (odd[16][lane] * t29) + 2.0 * (odd[17][lane] * t30) + (2.0 * (odd[19][lane] * t28) - 2.0 * (odd[18][lane] * t31));
+        increment_y[10][lane] = 2.0 * (odd[18][lane] * t35) - 2.0 * (odd[19][lane] * t32) + (2.0 * (odd[16][lane] * t33) + 2.0 * (odd[17][lane] * t34));
+        increment_y[11][lane] = (-2.0) * (odd[16][lane] * t38) - 2.0 * (odd[17][lane] * t37) + (2.0 * (odd[19][lane] * t18) - 2.0 * (odd[18][lane] * t36));
+        increment_y[12][lane] = 2.0 * (odd[24][lane] * t20) - 2.0 * (odd[25][lane] * t23) + (2.0 * (odd[27][lane] * t19) + 2.0 * (odd[26][lane] * t26));
+        increment_y[13][lane] = 2.0 * (odd[24][lane] * t29) + 2.0 * (odd[25][lane] * t30) + (2.0 * (odd[27][lane] * t28) - 2.0 * (odd[26][lane] * t31));
+        increment_y[14][lane] = 2.0 * (odd[26][lane] * t35) - 2.0 * (odd[27][lane] * t32) + (2.0 * (odd[24][lane] * t33) + 2.0 * (odd[25][lane] * t34));
+        increment_y[15][lane] = (-2.0) * (odd[24][lane] * t38) - 2.0 * (odd[25][lane] * t37) + (2.0 * (odd[27][lane] * t18) - 2.0 * (odd[26][lane] * t36));
         jacobian[0][lane] = t63;
-        sway[13][lane] = work[0][lane];
-        sway[9][lane] = work[1][lane];
-        sway[1][lane] = work[2][lane];
-        sway[5][lane] = work[3][lane] - 1.0;
         jacobian[1][lane] = t72;
-        sway[6][lane] = work[6][lane];
-        sway[2][lane] = work[7][lane];
-        sway[10][lane] = work[4][lane] - 1.0;
-        sway[14][lane] = -work[5][lane];
         jacobian[2][lane] = t81;
-        sway[15][lane] = work[8][lane] - 1.0;
-        sway[11][lane] = work[9][lane];
-        sway[7][lane] = work[10][lane];
-        sway[3][lane] = -work[11][lane];
         jacobian[3][lane] = t90;
         jacobian[4][lane] = t95;
         jacobian[5][lane] = t96;
@@ -1531,38 +1515,6 @@ guiding_centre_APART static void guiding_centre_along_mean_lanes_part1(guiding_c
         increment_jacobian[6][lane] = t121;
         increment_jacobian[7][lane] = t122;
         increment_jacobian[8][lane] = t123;
-    }
-}
-
-/* guiding_centre_along_mean_lanes_part2 (part 2 of 2) */
-guiding_centre_APART static void guiding_centre_along_mean_lanes_part2(guiding_centre_lanes even[restrict 32],
-                                                                       guiding_centre_lanes odd[restrict 32],
-                                                                       guiding_centre_lanes mean[restrict 32],
-                                                                       guiding_centre_lanes hessian[restrict 16],
-                                                                       guiding_centre_lanes alpha_y[restrict 16],
-                                                                       guiding_centre_lanes increment_y[restrict 16],
-                                                                       guiding_centre_lanes jacobian[restrict 16],
-                                                                       guiding_centre_lanes increment_jacobian[restrict 16],
-                                                                       guiding_centre_lanes sway[restrict 16],
-                                                                       guiding_centre_lanes reciprocal[restrict 4],
-                                                                       guiding_centre_lanes work[restrict 16])
-{
-    (void)even;
-    (void)mean;
-    (void)alpha_y;
-    (void)increment_y;
-    (void)jacobian;
-    (void)sway;
-    (void)reciprocal;
-    guiding_centre_EACH_LANE
-    for (int lane = 0; lane < guiding_centre_LANES; ++lane) {
-        const double t124 = 2.0 * (hessian[1][lane] * odd[20][lane]) + 2.0 * (hessian[5][lane] * odd[21][lane]) + (2.0 * (hessian[13][lane] * odd[23][lane]) + 2.0 * (hessian[9][lane] * odd[22][lane])) + (2.0 * (odd[19][lane] * work[0][lane]) + 2.0 * (odd[18][lane] * work[1][lane]) + (2.0 * (odd[16][lane] * work[2][lane]) + 2.0 * (odd[17][lane] * work[3][lane])));
-        const double t125 = 2.0 * (hessian[6][lane] * odd[21][lane]) + 2.0 * (hessian[2][lane] * odd[20][lane]) + (2.0 * (hessian[10][lane] * odd[22][lane]) + 2.0 * (hessian[14][lane] * odd[23][lane])) + (2.0 * (odd[18][lane] * work[4][lane]) - 2.0 * (odd[19][lane] * work[5][lane]) + (2.0 * (odd[17][lane] * work[6][lane]) + 2.0 * (odd[16][lane] * work[7][lane])));
-        const double t126 = 2.0 * (hessian[15][lane] * odd[23][lane]) + 2.0 * (hessian[11][lane] * odd[22][lane]) + (2.0 * (hessian[3][lane] * odd[20][lane]) + 2.0 * (hessian[7][lane] * odd[21][lane])) + (2.0 * (odd[19][lane] * work[8][lane]) + 2.0 * (odd[18][lane] * work[9][lane]) + (2.0 * (odd[17][lane] * work[10][lane]) - 2.0 * (odd[16][lane] * work[11][lane])));
-        const double t127 = 2.0 * (hessian[0][lane] * odd[28][lane]) + 2.0 * (hessian[4][lane] * odd[29][lane]) + (2.0 * (hessian[12][lane] * odd[31][lane]) + 2.0 * (hessian[8][lane] * odd[30][lane])) + (2.0 * (odd[27][lane] * work[12][lane]) + 2.0 * (odd[26][lane] * work[13][lane]) + (2.0 * (odd[25][lane] * work[14][lane]) + 2.0 * (odd[24][lane] * work[15][lane])));
-        const double t128 = 2.0 * (hessian[9][lane] * odd[30][lane]) + 2.0 * (hessian[13][lane] * odd[31][lane]) + (2.0 * (hessian[1][lane] * odd[28][lane]) + 2.0 * (hessian[5][lane] * odd[29][lane])) + (2.0 * (odd[27][lane] * work[0][lane]) + 2.0 * (odd[26][lane] * work[1][lane]) + (2.0 * (odd[24][lane] * work[2][lane]) + 2.0 * (odd[25][lane] * work[3][lane])));
-        const double t129 = 2.0 * (hessian[10][lane] * odd[30][lane]) + 2.0 * (hessian[14][lane] * odd[31][lane]) + (2.0 * (hessian[2][lane] * odd[28][lane]) + 2.0 * (hessian[6][lane] * odd[29][lane])) + (2.0 * (odd[25][lane] * work[6][lane]) + 2.0 * (odd[24][lane] * work[7][lane]) + (2.0 * (odd[26][lane] * work[4][lane]) - 2.0 * (odd[27][lane] * work[5][lane])));
-        const double t130 = 2.0 * (hessian[7][lane] * odd[29][lane]) + 2.0 * (hessian[3][lane] * odd[28][lane]) + (2.0 * (hessian[11][lane] * odd[30][lane]) + 2.0 * (hessian[15][lane] * odd[31][lane])) + (2.0 * (odd[25][lane] * work[10][lane]) - 2.0 * (odd[24][lane] * work[11][lane]) + (2.0 * (odd[27][lane] * work[8][lane]) + 2.0 * (odd[26][lane] * work[9][lane])));
         increment_jacobian[9][lane] = t124;
         increment_jacobian[10][lane] = t125;
         increment_jacobian[11][lane] = t126;
@@ -1570,24 +1522,11 @@ guiding_centre_APART static void guiding_centre_along_mean_lanes_part2(guiding_c
         increment_jacobian[13][lane] = t128;
         increment_jacobian[14][lane] = t129;
         increment_jacobian[15][lane] = t130;
+        reciprocal[0][lane] = t2;
+        reciprocal[1][lane] = t4;
+        reciprocal[2][lane] = t10;
+        reciprocal[3][lane] = t18;
     }
-}
-
-/* guiding_centre_along_mean in all lanes. */
-static void guiding_centre_along_mean_lanes(guiding_centre_lanes even[restrict 32],
-                                            guiding_centre_lanes odd[restrict 32],
-                                            guiding_centre_lanes mean[restrict 32],
-                                            guiding_centre_lanes hessian[restrict 16],
-                                            guiding_centre_lanes alpha_y[restrict 16],
-                                            guiding_centre_lanes increment_y[restrict 16],
-                                            guiding_centre_lanes jacobian[restrict 16],
-                                            guiding_centre_lanes increment_jacobian[restrict 16],
-                                            guiding_centre_lanes sway[restrict 16],
-                                            guiding_centre_lanes reciprocal[restrict 4])
-{
-    guiding_centre_lanes work[16];
-    guiding_centre_along_mean_lanes_part1(even, odd, mean, hessian, alpha_y, increment_y, jacobian, increment_jacobian, sway, reciprocal, work);
-    guiding_centre_along_mean_lanes_part2(even, odd, mean, hessian, alpha_y, increment_y, jacobian, increment_jacobian, sway, reciprocal, work);
 }
 
 /* guiding_centre_invert in all lanes. */
@@ -1746,7 +1685,7 @@ typedef struct {
     guiding_centre_lanes v[8 + 1][32];
     guiding_centre_lanes even[4], odd[4], mean[4]; /* sums of terms, those of even order also as means over time */
     guiding_centre_lanes v_even[32], v_odd[32], v_mean[32];
-    guiding_centre_lanes unit[4]; /* what terms are measured by */
+    guiding_centre_lanes unit[4]; /* what terms are multiplied by to be measured */
     int terms; /* orders that are known */
 } guiding_centre_expansion;
 
@@ -2141,11 +2080,11 @@ static void guiding_centre_begin(guiding_centre_lanes coef[restrict], guiding_ce
         for (int lane = 0; lane < guiding_centre_LANES; ++lane) e->unit[i][lane] = 1.0 / (e->unit[i][lane] + 1e-5 * norm[lane]);
 }
 
-/* Add the terms of the odd order k and of the next. */
-static void guiding_centre_add_terms(guiding_centre_expansion *e, int k, guiding_centre_lanes size)
+/* Add the terms of the odd order k and of the next; their size. */
+static double guiding_centre_add_terms(guiding_centre_expansion *e, int k)
 {
+    guiding_centre_lanes size = { 0.0 };
     const double share = 1.0 / (k + 2);
-    memset(size, 0, guiding_centre_LANES * sizeof size[0]);
     for (int i = 0; i < 4; ++i) {
         guiding_centre_EACH_LANE
         for (int lane = 0; lane < guiding_centre_LANES; ++lane) {
@@ -2156,49 +2095,63 @@ static void guiding_centre_add_terms(guiding_centre_expansion *e, int k, guiding
             size[lane] += (fabs(odd) + fabs(even)) * e->unit[i][lane];
         }
     }
+    return guiding_centre_largest_finite(size);
 }
 
-/* Go on by two orders at a time, until these are below accuracy in all lanes that are finite. Where 16 terms do not
-   suffice, the path is too long to be followed here: infinite. */
+/* Go on by two orders at a time, until these are below accuracy in all lanes that are finite, or 16 are known: whether
+   they suffice is checked at the ends. */
 static void guiding_centre_extend(guiding_centre_lanes coef[restrict], guiding_centre_expansion *e, double accuracy)
 {
-    guiding_centre_lanes size;
-    double largest = HUGE_VAL;
-    for (; e->terms < 16 && largest > accuracy; e->terms += 2) {
+    double size = HUGE_VAL;
+    for (; e->terms < 16 && size > accuracy; e->terms += 2) {
         if (e->terms > 0) guiding_centre_next_order(coef, e, e->terms);
         guiding_centre_next_order(coef, e, e->terms + 1);
-        guiding_centre_add_terms(e, e->terms + 1, size);
-        largest = guiding_centre_largest_finite(size);
+        size = guiding_centre_add_terms(e, e->terms + 1);
     }
-    for (int lane = 0; lane < guiding_centre_LANES && largest > accuracy; ++lane)
-        if (size[lane] > accuracy) e->mean[0][lane] = HUGE_VAL;
 }
 
-/* guiding_centre_holds at one end of the paths, time 1 or -1, in all lanes: infinite where the equation does not hold. */
-static void guiding_centre_check_end(guiding_centre_lanes coef[restrict], guiding_centre_expansion *e, double time,
-    guiding_centre_lanes wrong)
+/* guiding_centre_holds in all lanes, at one end of the paths, where the expansions have the given slope: infinite where the
+   equation does not hold. */
+static void guiding_centre_check_end(guiding_centre_lanes coef[restrict], guiding_centre_expansion *e, guiding_centre_lanes m[restrict 4],
+    guiding_centre_lanes slope[restrict 4], guiding_centre_lanes wrong)
 {
     static const int field[4] = { 30, 38, 49, 54 };
-    guiding_centre_lanes m[4], slope[4], value[55], fixed[1], scale = { 0.0 };
-    memset(slope, 0, sizeof slope);
-    for (int i = 0; i < 4; ++i) {
-        double power = 1.0;
-        for (int k = 1; k <= e->terms; ++k, power *= time) {
-            guiding_centre_EACH_LANE
-            for (int lane = 0; lane < guiding_centre_LANES; ++lane) slope[i][lane] += k * power * e->s[i][k][lane];
-        }
-        guiding_centre_EACH_LANE
-        for (int lane = 0; lane < guiding_centre_LANES; ++lane) {
-            m[i][lane] = e->s[i][0][lane] + (e->even[i][lane] + time * e->odd[i][lane]);
-            scale[lane] += fabs(m[i][lane]) + fabs(slope[i][lane]);
-        }
-    }
+    guiding_centre_lanes value[55], fixed[1], scale = { 0.0 };
     guiding_centre_values_lanes(coef, e->p, m, value, fixed);
     for (int i = 0; i < 4; ++i)
+        for (int lane = 0; lane < guiding_centre_LANES; ++lane) scale[lane] += fabs(m[i][lane]) + fabs(slope[i][lane]);
+    for (int i = 0; i < 4; ++i) {
+        guiding_centre_EACH_LANE
         for (int lane = 0; lane < guiding_centre_LANES; ++lane) {
             const double off = fabs(value[field[i]][lane] - slope[i][lane]);
             wrong[lane] += off <= 2e-15 * scale[lane] ? 0.0 : HUGE_VAL;
         }
+    }
+}
+
+/* The same at both ends. */
+static void guiding_centre_check_ends(guiding_centre_lanes coef[restrict], guiding_centre_expansion *e, guiding_centre_lanes wrong)
+{
+    guiding_centre_lanes start[4], end[4], start_slope[4], end_slope[4];
+    for (int i = 0; i < 4; ++i) {
+        guiding_centre_lanes even = { 0.0 }, odd = { 0.0 };
+        for (int k = 1; k < e->terms; k += 2) {
+            guiding_centre_EACH_LANE
+            for (int lane = 0; lane < guiding_centre_LANES; ++lane) {
+                odd[lane] += k * e->s[i][k][lane];
+                even[lane] += (k + 1) * e->s[i][k + 1][lane];
+            }
+        }
+        guiding_centre_EACH_LANE
+        for (int lane = 0; lane < guiding_centre_LANES; ++lane) {
+            start[i][lane] = e->s[i][0][lane] + (e->even[i][lane] - e->odd[i][lane]);
+            end[i][lane] = e->s[i][0][lane] + (e->even[i][lane] + e->odd[i][lane]);
+            start_slope[i][lane] = odd[lane] - even[lane];
+            end_slope[i][lane] = odd[lane] + even[lane];
+        }
+    }
+    guiding_centre_check_end(coef, e, start, start_slope, wrong);
+    guiding_centre_check_end(coef, e, end, end_slope, wrong);
 }
 
 /* Begin to expand the paths with mean y, from their middles as far as these are known. */
@@ -2381,7 +2334,7 @@ static void guiding_centre_add_slopes(guiding_centre_expansion *e, int k, guidin
 static void guiding_centre_vary(guiding_centre_lanes coef[restrict], guiding_centre_expansion *e)
 {
     guiding_centre_lanes slope[174], size;
-    double largest = HUGE_VAL;
+    double largest = 1.0, next = 1.0; /* the last two orders, and what is to be expected of the next */
     guiding_centre_slope_values_lanes(coef, e->p, e->value, e->fixed, slope, e->slope_fixed);
     for (int i = 0; i < 174; ++i) memcpy(e->slope[i][0], slope[i], sizeof slope[i]);
     memset(e->v_even, 0, sizeof e->v_even);
@@ -2390,27 +2343,18 @@ static void guiding_centre_vary(guiding_centre_lanes coef[restrict], guiding_cen
     for (int i = 0; i < 4; ++i)
         for (int lane = 0; lane < guiding_centre_LANES; ++lane)
             e->v_even[i * 8 + i][lane] = e->v_mean[i * 8 + i][lane] = 1.0;
-    for (int k = 0; k < 8 && largest > 1e-07; ++k) {
+    for (int k = 0; k < 8 && next > 1e-07; ++k) {
         if (k >= e->terms) guiding_centre_next_order(coef, e, k);
         if (k > 0) guiding_centre_follow_slopes(coef, e, k);
         guiding_centre_vary_order(e, k);
         if (k % 2 == 0) continue;
         guiding_centre_add_slopes(e, k, size);
+        next = guiding_centre_largest_finite(size);
+        next *= next / largest;
         largest = guiding_centre_largest_finite(size);
     }
-    for (int lane = 0; lane < guiding_centre_LANES && largest > 1e-07; ++lane)
+    for (int lane = 0; lane < guiding_centre_LANES && next > 1e-07; ++lane)
         if (size[lane] > 1e-07) e->v_mean[0][lane] = HUGE_VAL;
-}
-
-/* Put the middles of the paths where they are, to first order, after y was corrected. */
-static void guiding_centre_sway(guiding_centre_model *model)
-{
-    for (int i = 0; i < 4; ++i)
-        for (int j = 0; j < 4; ++j) {
-            guiding_centre_EACH_LANE
-            for (int lane = 0; lane < guiding_centre_LANES; ++lane)
-                model->middle[i][lane] += model->sway[i * 4 + j][lane] * (model->y[j][lane] - model->at[j][lane]);
-        }
 }
 
 /* alpha - y and beta - alpha from an expansion whose mean misses y by little, to first order in that. */
@@ -2424,7 +2368,6 @@ static void guiding_centre_read_ends(guiding_centre_model *model, guiding_centre
             model->displacement[i][lane] = ((model->middle[i][lane] + e->even[i][lane]) - e->odd[i][lane]) + wrong[lane];
             model->increment[i][lane] = 2.0 * e->odd[i][lane];
             model->middle[i][lane] = -e->mean[i][lane];
-            model->at[i][lane] = model->y[i][lane];
         }
     }
     for (int i = 0; i < 4; ++i)
@@ -2444,7 +2387,7 @@ static void guiding_centre_linearise_paths(guiding_centre_lanes coef[restrict], 
     guiding_centre_lanes jacobian[16], reciprocal[2 * 4];
     guiding_centre_vary(coef, e);
     guiding_centre_along_mean_lanes(e->v_even, e->v_odd, e->v_mean, hessian, model->alpha_y, model->increment_y, jacobian,
-        model->slope, model->sway, reciprocal);
+        model->slope, reciprocal);
     guiding_centre_invert_lanes(jacobian, model->slope, model->inverse, model->gain, reciprocal + 4);
     for (int i = 0; i < 2 * 4; ++i) {
         guiding_centre_EACH_LANE
@@ -2461,15 +2404,10 @@ static void guiding_centre_update(guiding_centre_lanes coef[restrict], guiding_c
     if (matrices) guiding_centre_curvature_lanes(coef, model->y, e.p, hessian);
     else guiding_centre_momentum_lanes(coef, model->y, e.p);
     guiding_centre_halve(e.p);
-    if (matrices) {
-        guiding_centre_settle(coef, model, &e);
-    } else {
-        guiding_centre_sway(model);
-        guiding_centre_begin_at(coef, model, &e);
-    }
+    if (matrices) guiding_centre_settle(coef, model, &e);
+    else guiding_centre_begin_at(coef, model, &e);
     guiding_centre_extend(coef, &e, 1e-17);
-    guiding_centre_check_end(coef, &e, 1.0, wrong);
-    guiding_centre_check_end(coef, &e, -1.0, wrong);
+    guiding_centre_check_ends(coef, &e, wrong);
     if (matrices) guiding_centre_linearise_paths(coef, model, &e, hessian);
     guiding_centre_read_ends(model, &e, wrong);
 }

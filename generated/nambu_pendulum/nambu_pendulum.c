@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 3ba3e57c7261a02d0e76a0239d66150fac4a3d70f52b74bbcec43f8fd6242788
+ * body-sha256: deecf5b0647c778af2b27340944c12819f4c067b3ce12e559f74b5425bdc90aa
  */
 #include "nambu_pendulum.h"
 
@@ -567,8 +567,7 @@ typedef struct {
 typedef struct {
     nambu_pendulum_lanes y[3], displacement[3], increment[3], residual[3];
     nambu_pendulum_lanes inverse[9], slope[9], gain[9];
-    nambu_pendulum_lanes at[3], middle[3]; /* y when it was last evaluated, the middle of the path less y */
-    nambu_pendulum_lanes sway[9]; /* the derivative of middle along y */
+    nambu_pendulum_lanes middle[3]; /* of the path, less y */
     nambu_pendulum_lanes alpha_y[9], increment_y[9]; /* of alpha and beta - alpha, with p held fixed */
 } nambu_pendulum_model;
 
@@ -725,7 +724,6 @@ static void nambu_pendulum_along_mean_lanes(nambu_pendulum_lanes even[restrict 1
                                             nambu_pendulum_lanes increment_y[restrict 9],
                                             nambu_pendulum_lanes jacobian[restrict 9],
                                             nambu_pendulum_lanes increment_jacobian[restrict 9],
-                                            nambu_pendulum_lanes sway[restrict 9],
                                             nambu_pendulum_lanes reciprocal[restrict 3])
 {
     nambu_pendulum_EACH_LANE
@@ -828,15 +826,6 @@ static void nambu_pendulum_along_mean_lanes(nambu_pendulum_lanes even[restrict 1
         increment_jacobian[6][lane] = t60;
         increment_jacobian[7][lane] = t61;
         increment_jacobian[8][lane] = t62;
-        sway[0][lane] = t35 - 1.0;
-        sway[1][lane] = t39;
-        sway[2][lane] = -t47;
-        sway[3][lane] = t34;
-        sway[4][lane] = t40 - 1.0;
-        sway[5][lane] = t46;
-        sway[6][lane] = t33;
-        sway[7][lane] = -t41;
-        sway[8][lane] = t45 - 1.0;
         reciprocal[0][lane] = t2;
         reciprocal[1][lane] = t5;
         reciprocal[2][lane] = t9;
@@ -967,7 +956,7 @@ typedef struct {
     nambu_pendulum_lanes v[12 + 1][18];
     nambu_pendulum_lanes even[3], odd[3], mean[3]; /* sums of terms, those of even order also as means over time */
     nambu_pendulum_lanes v_even[18], v_odd[18], v_mean[18];
-    nambu_pendulum_lanes unit[3]; /* what terms are measured by */
+    nambu_pendulum_lanes unit[3]; /* what terms are multiplied by to be measured */
     int terms; /* orders that are known */
 } nambu_pendulum_expansion;
 
@@ -1063,11 +1052,11 @@ static void nambu_pendulum_begin(nambu_pendulum_lanes coef[restrict], nambu_pend
         for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) e->unit[i][lane] = 1.0 / (e->unit[i][lane] + 1e-5 * norm[lane]);
 }
 
-/* Add the terms of the odd order k and of the next. */
-static void nambu_pendulum_add_terms(nambu_pendulum_expansion *e, int k, nambu_pendulum_lanes size)
+/* Add the terms of the odd order k and of the next; their size. */
+static double nambu_pendulum_add_terms(nambu_pendulum_expansion *e, int k)
 {
+    nambu_pendulum_lanes size = { 0.0 };
     const double share = 1.0 / (k + 2);
-    memset(size, 0, nambu_pendulum_LANES * sizeof size[0]);
     for (int i = 0; i < 3; ++i) {
         nambu_pendulum_EACH_LANE
         for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) {
@@ -1078,49 +1067,63 @@ static void nambu_pendulum_add_terms(nambu_pendulum_expansion *e, int k, nambu_p
             size[lane] += (fabs(odd) + fabs(even)) * e->unit[i][lane];
         }
     }
+    return nambu_pendulum_largest_finite(size);
 }
 
-/* Go on by two orders at a time, until these are below accuracy in all lanes that are finite. Where 16 terms do not
-   suffice, the path is too long to be followed here: infinite. */
+/* Go on by two orders at a time, until these are below accuracy in all lanes that are finite, or 16 are known: whether
+   they suffice is checked at the ends. */
 static void nambu_pendulum_extend(nambu_pendulum_lanes coef[restrict], nambu_pendulum_expansion *e, double accuracy)
 {
-    nambu_pendulum_lanes size;
-    double largest = HUGE_VAL;
-    for (; e->terms < 16 && largest > accuracy; e->terms += 2) {
+    double size = HUGE_VAL;
+    for (; e->terms < 16 && size > accuracy; e->terms += 2) {
         if (e->terms > 0) nambu_pendulum_next_order(coef, e, e->terms);
         nambu_pendulum_next_order(coef, e, e->terms + 1);
-        nambu_pendulum_add_terms(e, e->terms + 1, size);
-        largest = nambu_pendulum_largest_finite(size);
+        size = nambu_pendulum_add_terms(e, e->terms + 1);
     }
-    for (int lane = 0; lane < nambu_pendulum_LANES && largest > accuracy; ++lane)
-        if (size[lane] > accuracy) e->mean[0][lane] = HUGE_VAL;
 }
 
-/* nambu_pendulum_holds at one end of the paths, time 1 or -1, in all lanes: infinite where the equation does not hold. */
-static void nambu_pendulum_check_end(nambu_pendulum_lanes coef[restrict], nambu_pendulum_expansion *e, double time,
-    nambu_pendulum_lanes wrong)
+/* nambu_pendulum_holds in all lanes, at one end of the paths, where the expansions have the given slope: infinite where the
+   equation does not hold. */
+static void nambu_pendulum_check_end(nambu_pendulum_lanes coef[restrict], nambu_pendulum_expansion *e, nambu_pendulum_lanes m[restrict 3],
+    nambu_pendulum_lanes slope[restrict 3], nambu_pendulum_lanes wrong)
 {
     static const int field[3] = { 10, 6, 7 };
-    nambu_pendulum_lanes m[3], slope[3], value[11], fixed[1], scale = { 0.0 };
-    memset(slope, 0, sizeof slope);
-    for (int i = 0; i < 3; ++i) {
-        double power = 1.0;
-        for (int k = 1; k <= e->terms; ++k, power *= time) {
-            nambu_pendulum_EACH_LANE
-            for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) slope[i][lane] += k * power * e->s[i][k][lane];
-        }
-        nambu_pendulum_EACH_LANE
-        for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) {
-            m[i][lane] = e->s[i][0][lane] + (e->even[i][lane] + time * e->odd[i][lane]);
-            scale[lane] += fabs(m[i][lane]) + fabs(slope[i][lane]);
-        }
-    }
+    nambu_pendulum_lanes value[11], fixed[1], scale = { 0.0 };
     nambu_pendulum_values_lanes(coef, e->p, m, value, fixed);
     for (int i = 0; i < 3; ++i)
+        for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) scale[lane] += fabs(m[i][lane]) + fabs(slope[i][lane]);
+    for (int i = 0; i < 3; ++i) {
+        nambu_pendulum_EACH_LANE
         for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) {
             const double off = fabs(value[field[i]][lane] - slope[i][lane]);
             wrong[lane] += off <= 2e-15 * scale[lane] ? 0.0 : HUGE_VAL;
         }
+    }
+}
+
+/* The same at both ends. */
+static void nambu_pendulum_check_ends(nambu_pendulum_lanes coef[restrict], nambu_pendulum_expansion *e, nambu_pendulum_lanes wrong)
+{
+    nambu_pendulum_lanes start[3], end[3], start_slope[3], end_slope[3];
+    for (int i = 0; i < 3; ++i) {
+        nambu_pendulum_lanes even = { 0.0 }, odd = { 0.0 };
+        for (int k = 1; k < e->terms; k += 2) {
+            nambu_pendulum_EACH_LANE
+            for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) {
+                odd[lane] += k * e->s[i][k][lane];
+                even[lane] += (k + 1) * e->s[i][k + 1][lane];
+            }
+        }
+        nambu_pendulum_EACH_LANE
+        for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) {
+            start[i][lane] = e->s[i][0][lane] + (e->even[i][lane] - e->odd[i][lane]);
+            end[i][lane] = e->s[i][0][lane] + (e->even[i][lane] + e->odd[i][lane]);
+            start_slope[i][lane] = odd[lane] - even[lane];
+            end_slope[i][lane] = odd[lane] + even[lane];
+        }
+    }
+    nambu_pendulum_check_end(coef, e, start, start_slope, wrong);
+    nambu_pendulum_check_end(coef, e, end, end_slope, wrong);
 }
 
 /* Begin to expand the paths with mean y, from their middles as far as these are known. */
@@ -1255,7 +1258,7 @@ static void nambu_pendulum_add_slopes(nambu_pendulum_expansion *e, int k, nambu_
 static void nambu_pendulum_vary(nambu_pendulum_lanes coef[restrict], nambu_pendulum_expansion *e)
 {
     nambu_pendulum_lanes slope[5], size;
-    double largest = HUGE_VAL;
+    double largest = 1.0, next = 1.0; /* the last two orders, and what is to be expected of the next */
     nambu_pendulum_slope_values_lanes(coef, e->p, e->value, e->fixed, slope, e->slope_fixed);
     for (int i = 0; i < 5; ++i) memcpy(e->slope[i][0], slope[i], sizeof slope[i]);
     memset(e->v_even, 0, sizeof e->v_even);
@@ -1264,27 +1267,18 @@ static void nambu_pendulum_vary(nambu_pendulum_lanes coef[restrict], nambu_pendu
     for (int i = 0; i < 3; ++i)
         for (int lane = 0; lane < nambu_pendulum_LANES; ++lane)
             e->v_even[i * 6 + i][lane] = e->v_mean[i * 6 + i][lane] = 1.0;
-    for (int k = 0; k < 12 && largest > 1e-07; ++k) {
+    for (int k = 0; k < 12 && next > 1e-07; ++k) {
         if (k >= e->terms) nambu_pendulum_next_order(coef, e, k);
         if (k > 0) nambu_pendulum_follow_slopes(coef, e, k);
         nambu_pendulum_vary_order(e, k);
         if (k % 2 == 0) continue;
         nambu_pendulum_add_slopes(e, k, size);
+        next = nambu_pendulum_largest_finite(size);
+        next *= next / largest;
         largest = nambu_pendulum_largest_finite(size);
     }
-    for (int lane = 0; lane < nambu_pendulum_LANES && largest > 1e-07; ++lane)
+    for (int lane = 0; lane < nambu_pendulum_LANES && next > 1e-07; ++lane)
         if (size[lane] > 1e-07) e->v_mean[0][lane] = HUGE_VAL;
-}
-
-/* Put the middles of the paths where they are, to first order, after y was corrected. */
-static void nambu_pendulum_sway(nambu_pendulum_model *model)
-{
-    for (int i = 0; i < 3; ++i)
-        for (int j = 0; j < 3; ++j) {
-            nambu_pendulum_EACH_LANE
-            for (int lane = 0; lane < nambu_pendulum_LANES; ++lane)
-                model->middle[i][lane] += model->sway[i * 3 + j][lane] * (model->y[j][lane] - model->at[j][lane]);
-        }
 }
 
 /* alpha - y and beta - alpha from an expansion whose mean misses y by little, to first order in that. */
@@ -1298,7 +1292,6 @@ static void nambu_pendulum_read_ends(nambu_pendulum_model *model, nambu_pendulum
             model->displacement[i][lane] = ((model->middle[i][lane] + e->even[i][lane]) - e->odd[i][lane]) + wrong[lane];
             model->increment[i][lane] = 2.0 * e->odd[i][lane];
             model->middle[i][lane] = -e->mean[i][lane];
-            model->at[i][lane] = model->y[i][lane];
         }
     }
     for (int i = 0; i < 3; ++i)
@@ -1318,7 +1311,7 @@ static void nambu_pendulum_linearise_paths(nambu_pendulum_lanes coef[restrict], 
     nambu_pendulum_lanes jacobian[9], reciprocal[2 * 3];
     nambu_pendulum_vary(coef, e);
     nambu_pendulum_along_mean_lanes(e->v_even, e->v_odd, e->v_mean, hessian, model->alpha_y, model->increment_y, jacobian,
-        model->slope, model->sway, reciprocal);
+        model->slope, reciprocal);
     nambu_pendulum_invert_lanes(jacobian, model->slope, model->inverse, model->gain, reciprocal + 3);
     for (int i = 0; i < 2 * 3; ++i) {
         nambu_pendulum_EACH_LANE
@@ -1335,15 +1328,10 @@ static void nambu_pendulum_update(nambu_pendulum_lanes coef[restrict], nambu_pen
     if (matrices) nambu_pendulum_curvature_lanes(coef, model->y, e.p, hessian);
     else nambu_pendulum_momentum_lanes(coef, model->y, e.p);
     nambu_pendulum_halve(e.p);
-    if (matrices) {
-        nambu_pendulum_settle(coef, model, &e);
-    } else {
-        nambu_pendulum_sway(model);
-        nambu_pendulum_begin_at(coef, model, &e);
-    }
+    if (matrices) nambu_pendulum_settle(coef, model, &e);
+    else nambu_pendulum_begin_at(coef, model, &e);
     nambu_pendulum_extend(coef, &e, 1e-17);
-    nambu_pendulum_check_end(coef, &e, 1.0, wrong);
-    nambu_pendulum_check_end(coef, &e, -1.0, wrong);
+    nambu_pendulum_check_ends(coef, &e, wrong);
     if (matrices) nambu_pendulum_linearise_paths(coef, model, &e, hessian);
     nambu_pendulum_read_ends(model, &e, wrong);
 }

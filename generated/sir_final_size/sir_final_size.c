@@ -12,7 +12,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 967817bf6179ce8236e2395ae94fc98312e5a07debb200df0a4b466f921f0318
+ * body-sha256: 91cd27a69dbe7ade5a47e3c34bab93d911a2e2e68e6f9c3d9eea3b9af02c6efa
  */
 #include "sir_final_size.h"
 
@@ -569,8 +569,7 @@ typedef struct {
 typedef struct {
     sir_final_size_lanes y[3], displacement[3], increment[3], residual[3];
     sir_final_size_lanes inverse[9], slope[9], gain[9];
-    sir_final_size_lanes at[3], middle[3]; /* y when it was last evaluated, the middle of the path less y */
-    sir_final_size_lanes sway[9]; /* the derivative of middle along y */
+    sir_final_size_lanes middle[3]; /* of the path, less y */
     sir_final_size_lanes alpha_y[9], increment_y[9]; /* of alpha and beta - alpha, with p held fixed */
 } sir_final_size_model;
 
@@ -697,7 +696,6 @@ static void sir_final_size_along_mean_lanes(sir_final_size_lanes even[restrict 1
                                             sir_final_size_lanes increment_y[restrict 9],
                                             sir_final_size_lanes jacobian[restrict 9],
                                             sir_final_size_lanes increment_jacobian[restrict 9],
-                                            sir_final_size_lanes sway[restrict 9],
                                             sir_final_size_lanes reciprocal[restrict 3])
 {
     sir_final_size_EACH_LANE
@@ -800,15 +798,6 @@ static void sir_final_size_along_mean_lanes(sir_final_size_lanes even[restrict 1
         increment_jacobian[6][lane] = t60;
         increment_jacobian[7][lane] = t61;
         increment_jacobian[8][lane] = t62;
-        sway[0][lane] = t35 - 1.0;
-        sway[1][lane] = t39;
-        sway[2][lane] = -t47;
-        sway[3][lane] = t34;
-        sway[4][lane] = t40 - 1.0;
-        sway[5][lane] = t46;
-        sway[6][lane] = t33;
-        sway[7][lane] = -t41;
-        sway[8][lane] = t45 - 1.0;
         reciprocal[0][lane] = t2;
         reciprocal[1][lane] = t5;
         reciprocal[2][lane] = t9;
@@ -939,7 +928,7 @@ typedef struct {
     sir_final_size_lanes v[12 + 1][18];
     sir_final_size_lanes even[3], odd[3], mean[3]; /* sums of terms, those of even order also as means over time */
     sir_final_size_lanes v_even[18], v_odd[18], v_mean[18];
-    sir_final_size_lanes unit[3]; /* what terms are measured by */
+    sir_final_size_lanes unit[3]; /* what terms are multiplied by to be measured */
     int terms; /* orders that are known */
 } sir_final_size_expansion;
 
@@ -1043,11 +1032,11 @@ static void sir_final_size_begin(sir_final_size_lanes coef[restrict], sir_final_
         for (int lane = 0; lane < sir_final_size_LANES; ++lane) e->unit[i][lane] = 1.0 / (e->unit[i][lane] + 1e-5 * norm[lane]);
 }
 
-/* Add the terms of the odd order k and of the next. */
-static void sir_final_size_add_terms(sir_final_size_expansion *e, int k, sir_final_size_lanes size)
+/* Add the terms of the odd order k and of the next; their size. */
+static double sir_final_size_add_terms(sir_final_size_expansion *e, int k)
 {
+    sir_final_size_lanes size = { 0.0 };
     const double share = 1.0 / (k + 2);
-    memset(size, 0, sir_final_size_LANES * sizeof size[0]);
     for (int i = 0; i < 3; ++i) {
         sir_final_size_EACH_LANE
         for (int lane = 0; lane < sir_final_size_LANES; ++lane) {
@@ -1058,49 +1047,63 @@ static void sir_final_size_add_terms(sir_final_size_expansion *e, int k, sir_fin
             size[lane] += (fabs(odd) + fabs(even)) * e->unit[i][lane];
         }
     }
+    return sir_final_size_largest_finite(size);
 }
 
-/* Go on by two orders at a time, until these are below accuracy in all lanes that are finite. Where 16 terms do not
-   suffice, the path is too long to be followed here: infinite. */
+/* Go on by two orders at a time, until these are below accuracy in all lanes that are finite, or 16 are known: whether
+   they suffice is checked at the ends. */
 static void sir_final_size_extend(sir_final_size_lanes coef[restrict], sir_final_size_expansion *e, double accuracy)
 {
-    sir_final_size_lanes size;
-    double largest = HUGE_VAL;
-    for (; e->terms < 16 && largest > accuracy; e->terms += 2) {
+    double size = HUGE_VAL;
+    for (; e->terms < 16 && size > accuracy; e->terms += 2) {
         if (e->terms > 0) sir_final_size_next_order(coef, e, e->terms);
         sir_final_size_next_order(coef, e, e->terms + 1);
-        sir_final_size_add_terms(e, e->terms + 1, size);
-        largest = sir_final_size_largest_finite(size);
+        size = sir_final_size_add_terms(e, e->terms + 1);
     }
-    for (int lane = 0; lane < sir_final_size_LANES && largest > accuracy; ++lane)
-        if (size[lane] > accuracy) e->mean[0][lane] = HUGE_VAL;
 }
 
-/* sir_final_size_holds at one end of the paths, time 1 or -1, in all lanes: infinite where the equation does not hold. */
-static void sir_final_size_check_end(sir_final_size_lanes coef[restrict], sir_final_size_expansion *e, double time,
-    sir_final_size_lanes wrong)
+/* sir_final_size_holds in all lanes, at one end of the paths, where the expansions have the given slope: infinite where the
+   equation does not hold. */
+static void sir_final_size_check_end(sir_final_size_lanes coef[restrict], sir_final_size_expansion *e, sir_final_size_lanes m[restrict 3],
+    sir_final_size_lanes slope[restrict 3], sir_final_size_lanes wrong)
 {
     static const int field[3] = { 6, 9, 13 };
-    sir_final_size_lanes m[3], slope[3], value[14], fixed[1], scale = { 0.0 };
-    memset(slope, 0, sizeof slope);
-    for (int i = 0; i < 3; ++i) {
-        double power = 1.0;
-        for (int k = 1; k <= e->terms; ++k, power *= time) {
-            sir_final_size_EACH_LANE
-            for (int lane = 0; lane < sir_final_size_LANES; ++lane) slope[i][lane] += k * power * e->s[i][k][lane];
-        }
-        sir_final_size_EACH_LANE
-        for (int lane = 0; lane < sir_final_size_LANES; ++lane) {
-            m[i][lane] = e->s[i][0][lane] + (e->even[i][lane] + time * e->odd[i][lane]);
-            scale[lane] += fabs(m[i][lane]) + fabs(slope[i][lane]);
-        }
-    }
+    sir_final_size_lanes value[14], fixed[1], scale = { 0.0 };
     sir_final_size_values_lanes(coef, e->p, m, value, fixed);
     for (int i = 0; i < 3; ++i)
+        for (int lane = 0; lane < sir_final_size_LANES; ++lane) scale[lane] += fabs(m[i][lane]) + fabs(slope[i][lane]);
+    for (int i = 0; i < 3; ++i) {
+        sir_final_size_EACH_LANE
         for (int lane = 0; lane < sir_final_size_LANES; ++lane) {
             const double off = fabs(value[field[i]][lane] - slope[i][lane]);
             wrong[lane] += off <= 2e-15 * scale[lane] ? 0.0 : HUGE_VAL;
         }
+    }
+}
+
+/* The same at both ends. */
+static void sir_final_size_check_ends(sir_final_size_lanes coef[restrict], sir_final_size_expansion *e, sir_final_size_lanes wrong)
+{
+    sir_final_size_lanes start[3], end[3], start_slope[3], end_slope[3];
+    for (int i = 0; i < 3; ++i) {
+        sir_final_size_lanes even = { 0.0 }, odd = { 0.0 };
+        for (int k = 1; k < e->terms; k += 2) {
+            sir_final_size_EACH_LANE
+            for (int lane = 0; lane < sir_final_size_LANES; ++lane) {
+                odd[lane] += k * e->s[i][k][lane];
+                even[lane] += (k + 1) * e->s[i][k + 1][lane];
+            }
+        }
+        sir_final_size_EACH_LANE
+        for (int lane = 0; lane < sir_final_size_LANES; ++lane) {
+            start[i][lane] = e->s[i][0][lane] + (e->even[i][lane] - e->odd[i][lane]);
+            end[i][lane] = e->s[i][0][lane] + (e->even[i][lane] + e->odd[i][lane]);
+            start_slope[i][lane] = odd[lane] - even[lane];
+            end_slope[i][lane] = odd[lane] + even[lane];
+        }
+    }
+    sir_final_size_check_end(coef, e, start, start_slope, wrong);
+    sir_final_size_check_end(coef, e, end, end_slope, wrong);
 }
 
 /* Begin to expand the paths with mean y, from their middles as far as these are known. */
@@ -1249,7 +1252,7 @@ static void sir_final_size_add_slopes(sir_final_size_expansion *e, int k, sir_fi
 static void sir_final_size_vary(sir_final_size_lanes coef[restrict], sir_final_size_expansion *e)
 {
     sir_final_size_lanes slope[15], size;
-    double largest = HUGE_VAL;
+    double largest = 1.0, next = 1.0; /* the last two orders, and what is to be expected of the next */
     sir_final_size_slope_values_lanes(coef, e->p, e->value, e->fixed, slope, e->slope_fixed);
     for (int i = 0; i < 15; ++i) memcpy(e->slope[i][0], slope[i], sizeof slope[i]);
     memset(e->v_even, 0, sizeof e->v_even);
@@ -1258,27 +1261,18 @@ static void sir_final_size_vary(sir_final_size_lanes coef[restrict], sir_final_s
     for (int i = 0; i < 3; ++i)
         for (int lane = 0; lane < sir_final_size_LANES; ++lane)
             e->v_even[i * 6 + i][lane] = e->v_mean[i * 6 + i][lane] = 1.0;
-    for (int k = 0; k < 12 && largest > 1e-07; ++k) {
+    for (int k = 0; k < 12 && next > 1e-07; ++k) {
         if (k >= e->terms) sir_final_size_next_order(coef, e, k);
         if (k > 0) sir_final_size_follow_slopes(coef, e, k);
         sir_final_size_vary_order(e, k);
         if (k % 2 == 0) continue;
         sir_final_size_add_slopes(e, k, size);
+        next = sir_final_size_largest_finite(size);
+        next *= next / largest;
         largest = sir_final_size_largest_finite(size);
     }
-    for (int lane = 0; lane < sir_final_size_LANES && largest > 1e-07; ++lane)
+    for (int lane = 0; lane < sir_final_size_LANES && next > 1e-07; ++lane)
         if (size[lane] > 1e-07) e->v_mean[0][lane] = HUGE_VAL;
-}
-
-/* Put the middles of the paths where they are, to first order, after y was corrected. */
-static void sir_final_size_sway(sir_final_size_model *model)
-{
-    for (int i = 0; i < 3; ++i)
-        for (int j = 0; j < 3; ++j) {
-            sir_final_size_EACH_LANE
-            for (int lane = 0; lane < sir_final_size_LANES; ++lane)
-                model->middle[i][lane] += model->sway[i * 3 + j][lane] * (model->y[j][lane] - model->at[j][lane]);
-        }
 }
 
 /* alpha - y and beta - alpha from an expansion whose mean misses y by little, to first order in that. */
@@ -1292,7 +1286,6 @@ static void sir_final_size_read_ends(sir_final_size_model *model, sir_final_size
             model->displacement[i][lane] = ((model->middle[i][lane] + e->even[i][lane]) - e->odd[i][lane]) + wrong[lane];
             model->increment[i][lane] = 2.0 * e->odd[i][lane];
             model->middle[i][lane] = -e->mean[i][lane];
-            model->at[i][lane] = model->y[i][lane];
         }
     }
     for (int i = 0; i < 3; ++i)
@@ -1312,7 +1305,7 @@ static void sir_final_size_linearise_paths(sir_final_size_lanes coef[restrict], 
     sir_final_size_lanes jacobian[9], reciprocal[2 * 3];
     sir_final_size_vary(coef, e);
     sir_final_size_along_mean_lanes(e->v_even, e->v_odd, e->v_mean, hessian, model->alpha_y, model->increment_y, jacobian,
-        model->slope, model->sway, reciprocal);
+        model->slope, reciprocal);
     sir_final_size_invert_lanes(jacobian, model->slope, model->inverse, model->gain, reciprocal + 3);
     for (int i = 0; i < 2 * 3; ++i) {
         sir_final_size_EACH_LANE
@@ -1329,15 +1322,10 @@ static void sir_final_size_update(sir_final_size_lanes coef[restrict], sir_final
     if (matrices) sir_final_size_curvature_lanes(coef, model->y, e.p, hessian);
     else sir_final_size_momentum_lanes(coef, model->y, e.p);
     sir_final_size_halve(e.p);
-    if (matrices) {
-        sir_final_size_settle(coef, model, &e);
-    } else {
-        sir_final_size_sway(model);
-        sir_final_size_begin_at(coef, model, &e);
-    }
+    if (matrices) sir_final_size_settle(coef, model, &e);
+    else sir_final_size_begin_at(coef, model, &e);
     sir_final_size_extend(coef, &e, 1e-17);
-    sir_final_size_check_end(coef, &e, 1.0, wrong);
-    sir_final_size_check_end(coef, &e, -1.0, wrong);
+    sir_final_size_check_ends(coef, &e, wrong);
     if (matrices) sir_final_size_linearise_paths(coef, model, &e, hessian);
     sir_final_size_read_ends(model, &e, wrong);
 }

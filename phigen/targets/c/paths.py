@@ -38,7 +38,7 @@ def stack(program: Program, slope_terms: int) -> tuple[int, int]:
     n, path, slopes = program.dimension, program.path, program.path_slopes
     series = len(path.series) * (TERMS + 3) + len(slopes.series) * (slope_terms + 2)
     fixed = len(path.fixed) + len(slopes.fixed)
-    return 2 * n + 3 * n * n, series + fixed + 2 * n * n * (slope_terms + 4) + 2 * n * n + 8 * n
+    return n + 2 * n * n, series + fixed + 2 * n * n * (slope_terms + 4) + 2 * n * n + 8 * n
 
 
 def model_members(program: Program) -> list[str]:
@@ -47,8 +47,7 @@ def model_members(program: Program) -> list[str]:
         return []
     name, n = program.name, program.dimension
     return [
-        f"{name}_lanes at[{n}], middle[{n}]; /* y when it was last evaluated, the middle of the path less y */",
-        f"{name}_lanes sway[{n * n}]; /* the derivative of middle along y */",
+        f"{name}_lanes middle[{n}]; /* of the path, less y */",
         f"{name}_lanes alpha_y[{n * n}], increment_y[{n * n}]; /* of alpha and beta - alpha, with p held fixed */",
     ]
 
@@ -106,11 +105,7 @@ def _along_mean(n: int) -> Kernel:
         by_m, by_p = _matrix(value, n, 2 * n, 0), _matrix(value, n, 2 * n, n)
         fixed.append(_times(by_m, inverse))
         along.append(_plus(_times(by_m, follows), _times(by_p, hessian)))
-    named = zip(
-        ("alpha_y", "increment_y", "jacobian", "increment_jacobian", "sway"),
-        (*fixed, *along, _plus(follows, _identity(n), -1)),
-        strict=True,
-    )
+    named = zip(("alpha_y", "increment_y", "jacobian", "increment_jacobian"), (*fixed, *along), strict=True)
     outputs = [Output(name, tuple(e for row in matrix for e in row)) for name, matrix in named]
     purpose = "derivatives along the mean of a path"
     return Kernel("along_mean", purpose, inputs, (*outputs, Output("reciprocal", tuple(reciprocals))))
