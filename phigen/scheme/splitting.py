@@ -10,6 +10,7 @@ from phigen.geometry.system import System
 from phigen.scheme.alternation import Schedule
 from phigen.scheme.choosing import Choice
 from phigen.scheme.discretisation import MOST_OPERATIONS, too_large
+from phigen.scheme.gathering import gather
 from phigen.scheme.gauge import Gauge
 from phigen.scheme.kernels import observables
 from phigen.scheme.lowering import cost, operation_counts
@@ -19,6 +20,7 @@ from phigen.scheme.tangent import explicit_jacobian
 from phigen.spec.model import NO_EXTRAS, Extras
 from phigen.splitting.flow import Flow
 from phigen.splitting.ring import KICK, TIME
+from phigen.symbolic.expression import Expression
 
 
 def build_splitting(
@@ -89,13 +91,19 @@ def facts(choice: Choice, steps: Schedule) -> list[str]:
 
 
 def _flow_kernel(system: System, flow: Flow, k: int, coefficients: Coefficients) -> Kernel:
-    increment = coefficients.hoist(flow.increment)
+    increment = _staged(flow, coefficients)
     return Kernel(
         f"flow{k}",
         f"the flow of H_{k} = {flow.hamiltonian}: {flow.manner}".replace(KICK, KICK[:-1]),
         {"coef": coefficients.slots, "state": system.coordinates},
         (Output("increment", tuple(increment)),),
     )
+
+
+def _staged(flow: Flow, coefficients: Coefficients) -> list[Expression]:
+    """The increments with coefficients for what does not depend on the state, in the cheaper of two ways."""
+    hoisted, gathered = (cost(way(coefficients.empty(), flow.increment)) for way in (Coefficients.hoist, gather))
+    return gather(coefficients, flow.increment) if gathered < hoisted else coefficients.hoist(flow.increment)
 
 
 def _operations(flows: Sequence[Kernel], steps: Schedule) -> dict[str, int]:

@@ -20,6 +20,10 @@ class Coefficients:
         """The symbols of all coefficients so far."""
         return tuple(f"c:{k}" for k in range(len(self.values)))
 
+    def empty(self) -> Coefficients:
+        """A table with the same static symbols and no values."""
+        return Coefficients(self._static)
+
     def hoist(self, roots: Sequence[Expression]) -> list[Expression]:
         """The roots with each largest state-independent part replaced by a coefficient ``c:k``.
 
@@ -40,6 +44,10 @@ class Coefficients:
 
         done = fold(roots, visit)
         return [self.slot(self._written_out(r)) if fixed[id(r)] else d for r, d in zip(roots, done, strict=True)]
+
+    def is_static(self, e: Expression) -> bool:
+        """Whether an expression does not depend on the state."""
+        return all(name in self._static for name in symbols_of(e))
 
     def slot(self, e: Expression) -> Expression:
         """The coefficient that stands for a state-independent expression; a number stands for itself."""

@@ -63,7 +63,8 @@ static void members_equal_steps(int members, double h, int steps, double ulps)
     }
 }
 
-/* A member that has no state, and one whose first step leaves the numbers, keep theirs and do not disturb the others. */
+/* A member that has no state, and one whose first step leaves the numbers, keep theirs and do not disturb the others,
+   though these may go the longer way with it, by other versions of the functions. */
 static void failures_stay_alone(int members, int steps)
 {
     double x0[DIM];
@@ -78,7 +79,7 @@ static void failures_stay_alone(int members, int steps)
         if (m == bad) continue;
         member(m, x0);
         for (int i = 0; i < DIM && m == large; ++i) x0[i] = i % 2 ? -1e308 : 1e308;
-        expect_steps(members, m, x0, STEP, steps, ULPS);
+        expect_steps(members, m, x0, STEP, steps, ULPS + (FAR > 1 ? 4 : 0));
     }
 }
 

@@ -24,7 +24,7 @@ def pieces(program: Program, values: Mapping[str, object]) -> list[str]:
             render("c", "flow.c", own | {"k": k, "moved": list(enumerate(moved)), "count": max(1, len(moved))})
         )
     rows = "rows_kicks.c" if schedule.multiples else "rows.c"
-    step = _step(program, schedule, "", "x, carry")
+    step = _step(program, schedule, "", "x, moved, s->x")
     return [*found, render("c", rows, own), render("c", "splitting.c", own | {"step": step})]
 
 
@@ -37,7 +37,7 @@ def in_lanes(program: Program, values: Mapping[str, object], form: str, function
         found.append(function(program, kernel, lanes=True, shared=["coef"], functions=functions) + "\n")
         own = {"k": k, "form": end, "moved": list(enumerate(moved)), "count": max(1, len(moved))}
         found.append(render("c", "flow_lanes.c", {**values, **own}))
-    step = _step(program, schedule_of(program), end, "pack, packs")
+    step = _step(program, schedule_of(program), end, "pack, start, packs")
     return [*found, render("c", "splitting_lanes.c", {**values, "form": end, "step": step})]
 
 

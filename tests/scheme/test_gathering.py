@@ -1,0 +1,35 @@
+"""Static factors gathered: the same values, with fewer operations in a step."""
+
+import pytest
+
+from phigen.scheme.gathering import gather
+from phigen.scheme.lowering import cost
+from phigen.scheme.staging import Coefficients
+from phigen.symbolic.expression import call, number, symbol, text
+from phigen.symbolic.numeric import evaluate
+
+x, y, h, k = (symbol(n) for n in ("x", "y", "h", "k"))
+HALF, QUARTER = number(1) / 2, number(1) / 4
+POINT = {"x": 0.7, "y": -1.3, "h": 0.11, "k": 2.3}
+
+#: An expression in the states x, y and the static h, k, and the cost of it with gathered coefficients.
+CASES = {
+    "a square": ((h * x / 2) ** 2, 2),
+    "a sum of squares": (QUARTER * h**2 * x**2 + QUARTER * (h**2 * y**2), 4),
+    "different statics": (h * x + k * y, 3),
+    "a number leaves a sum": (h * (HALF * x * y + QUARTER * (k * (x * call("sin", y)))), 25),
+    "differences": (h * (k * x) - HALF * (h * (k * y)), 3),
+    "what is static": (h * k - 3, 0),
+    "minus": (-x, 0),
+}
+
+
+@pytest.mark.parametrize(("e", "least"), CASES.values(), ids=CASES)
+def test_gathered_expressions_have_the_same_value_and_no_more_operations(e, least):
+    coefficients, plain = Coefficients(["h", "k"]), Coefficients(["h", "k"])
+    (found,) = gather(coefficients, [e])
+    values = evaluate(coefficients.values, POINT)
+    slots = dict(zip(coefficients.slots, values, strict=True))
+    assert evaluate([found], POINT | slots) == pytest.approx(evaluate([e], POINT), rel=1e-15)
+    assert not {"h", "k"} & set(text(found).replace("*", " ").split())
+    assert cost([found]) <= min(least, cost(plain.hoist([e])))
