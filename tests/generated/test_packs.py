@@ -1,5 +1,6 @@
 """Ensembles of splittings and explicit steps: members in packs do what single trajectories do."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -160,3 +161,23 @@ def test_what_lanes_cannot_compute_is_not_taken_for_infinite(scheme):
     assert compilation.program.driver in ("explicit", "splitting")
     ends = solver(compilation, "c").ensemble([[0.0, 0.0, -800.0], [0.0, 0.0, 0.0]], 0.125, 64)
     np.testing.assert_allclose(ends, [[-32, -8, -800], [-16, -4, 0]], rtol=1e-14)
+
+
+@pytest.mark.parametrize("name", ["henon_heiles", "spin_chain5", "volterra5"])
+@pytest.mark.parametrize("compiler", ["gcc", "clang"])
+def test_steps_of_packs_become_vector_instructions(name, compiler, tmp_path):
+    """All of their arithmetic, by both compilers, with no more than -O2 and the instructions of 2013."""
+    write(tmp_path, emit(compiled(name, 4, "splitting").program, "c", COMMAND, single_file=True))
+    flags = "-std=c99 -O2 -march=haswell -fno-math-errno -S".split()
+    run([tool(compiler), *flags, f"{name}.c", "-o", "packs.s"], tmp_path)
+    vector, scalar, function = 0, 0, ""
+    for line in (tmp_path / "packs.s").read_text().splitlines():
+        label = re.match(rf"({name}\w*):", line)
+        function = label[1] if label else function
+        arithmetic = re.match(r"\s+v(?:add|sub|mul|fn?m(?:add|sub)\d+)([ps]d)\s", line)
+        if arithmetic and function.endswith(("_lanes", "_group_run")):
+            vector += arithmetic[1] == "pd"
+            # Single steps may have become part of group_run.
+            scalar += arithmetic[1] == "sd" and re.fullmatch(r"\w*flow\d_lanes", function) is not None
+    assert vector > 60
+    assert scalar == 0
