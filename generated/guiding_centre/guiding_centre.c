@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 4fb5616fef5d5700ef2bdf7b440181898cd37d80b9c3777449d61f8d8241dfcd
+ * body-sha256: a851e8dac613fa9b09cc131f272140f42dedeb5484c102cb8b7b2377e68e7022
  */
 #include "guiding_centre.h"
 
@@ -2175,7 +2175,8 @@ static void guiding_centre_settle(guiding_centre_lanes coef[restrict], guiding_c
             for (int lane = 0; lane < guiding_centre_LANES; ++lane) model->middle[i][lane] = -e->mean[i][lane];
         guiding_centre_begin_at(coef, model, e);
         guiding_centre_extend(coef, e, 1e-4 * left);
-        for (int lane = 0; lane < guiding_centre_LANES; ++lane) size[lane] = 0.0, norm[lane] = DBL_MIN;
+        memset(size, 0, sizeof size);
+        memset(norm, 0, sizeof norm);
         for (int i = 0; i < 4; ++i) {
             guiding_centre_EACH_LANE
             for (int lane = 0; lane < guiding_centre_LANES; ++lane) {
@@ -2183,7 +2184,7 @@ static void guiding_centre_settle(guiding_centre_lanes coef[restrict], guiding_c
                 norm[lane] += fabs(model->y[i][lane]);
             }
         }
-        for (int lane = 0; lane < guiding_centre_LANES; ++lane) size[lane] /= norm[lane];
+        for (int lane = 0; lane < guiding_centre_LANES; ++lane) size[lane] /= norm[lane] + DBL_MIN;
         left = guiding_centre_largest_finite(size);
         if (left > 1.0) left = 1.0;
     }
@@ -2349,9 +2350,9 @@ static void guiding_centre_vary(guiding_centre_lanes coef[restrict], guiding_cen
         guiding_centre_vary_order(e, k);
         if (k % 2 == 0) continue;
         guiding_centre_add_slopes(e, k, size);
-        next = guiding_centre_largest_finite(size);
-        next *= next / largest;
+        const double previous = largest;
         largest = guiding_centre_largest_finite(size);
+        next = largest * (largest / previous);
     }
     for (int lane = 0; lane < guiding_centre_LANES && next > 1e-07; ++lane)
         if (size[lane] > 1e-07) e->v_mean[0][lane] = HUGE_VAL;

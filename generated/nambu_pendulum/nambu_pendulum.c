@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: deecf5b0647c778af2b27340944c12819f4c067b3ce12e559f74b5425bdc90aa
+ * body-sha256: cb499a0bc5818b508ee0d4b51e0bd2d1fbc961c61c07f49795c36330d07e06f9
  */
 #include "nambu_pendulum.h"
 
@@ -1147,7 +1147,8 @@ static void nambu_pendulum_settle(nambu_pendulum_lanes coef[restrict], nambu_pen
             for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) model->middle[i][lane] = -e->mean[i][lane];
         nambu_pendulum_begin_at(coef, model, e);
         nambu_pendulum_extend(coef, e, 1e-4 * left);
-        for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) size[lane] = 0.0, norm[lane] = DBL_MIN;
+        memset(size, 0, sizeof size);
+        memset(norm, 0, sizeof norm);
         for (int i = 0; i < 3; ++i) {
             nambu_pendulum_EACH_LANE
             for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) {
@@ -1155,7 +1156,7 @@ static void nambu_pendulum_settle(nambu_pendulum_lanes coef[restrict], nambu_pen
                 norm[lane] += fabs(model->y[i][lane]);
             }
         }
-        for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) size[lane] /= norm[lane];
+        for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) size[lane] /= norm[lane] + DBL_MIN;
         left = nambu_pendulum_largest_finite(size);
         if (left > 1.0) left = 1.0;
     }
@@ -1273,9 +1274,9 @@ static void nambu_pendulum_vary(nambu_pendulum_lanes coef[restrict], nambu_pendu
         nambu_pendulum_vary_order(e, k);
         if (k % 2 == 0) continue;
         nambu_pendulum_add_slopes(e, k, size);
-        next = nambu_pendulum_largest_finite(size);
-        next *= next / largest;
+        const double previous = largest;
         largest = nambu_pendulum_largest_finite(size);
+        next = largest * (largest / previous);
     }
     for (int lane = 0; lane < nambu_pendulum_LANES && next > 1e-07; ++lane)
         if (size[lane] > 1e-07) e->v_mean[0][lane] = HUGE_VAL;

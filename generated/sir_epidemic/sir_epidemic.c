@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 7eaf709c90becdf557d140a4fa6ddb420c0e8d3b45f455c1fad1d437a93219c5
+ * body-sha256: 375622037b18b9b417ceff16c5a627523ed7e806fdad4d56b6b43039aef5158d
  */
 #include "sir_epidemic.h"
 
@@ -1108,7 +1108,8 @@ static void sir_epidemic_settle(sir_epidemic_lanes coef[restrict], sir_epidemic_
             for (int lane = 0; lane < sir_epidemic_LANES; ++lane) model->middle[i][lane] = -e->mean[i][lane];
         sir_epidemic_begin_at(coef, model, e);
         sir_epidemic_extend(coef, e, 1e-4 * left);
-        for (int lane = 0; lane < sir_epidemic_LANES; ++lane) size[lane] = 0.0, norm[lane] = DBL_MIN;
+        memset(size, 0, sizeof size);
+        memset(norm, 0, sizeof norm);
         for (int i = 0; i < 3; ++i) {
             sir_epidemic_EACH_LANE
             for (int lane = 0; lane < sir_epidemic_LANES; ++lane) {
@@ -1116,7 +1117,7 @@ static void sir_epidemic_settle(sir_epidemic_lanes coef[restrict], sir_epidemic_
                 norm[lane] += fabs(model->y[i][lane]);
             }
         }
-        for (int lane = 0; lane < sir_epidemic_LANES; ++lane) size[lane] /= norm[lane];
+        for (int lane = 0; lane < sir_epidemic_LANES; ++lane) size[lane] /= norm[lane] + DBL_MIN;
         left = sir_epidemic_largest_finite(size);
         if (left > 1.0) left = 1.0;
     }
@@ -1250,9 +1251,9 @@ static void sir_epidemic_vary(sir_epidemic_lanes coef[restrict], sir_epidemic_ex
         sir_epidemic_vary_order(e, k);
         if (k % 2 == 0) continue;
         sir_epidemic_add_slopes(e, k, size);
-        next = sir_epidemic_largest_finite(size);
-        next *= next / largest;
+        const double previous = largest;
         largest = sir_epidemic_largest_finite(size);
+        next = largest * (largest / previous);
     }
     for (int lane = 0; lane < sir_epidemic_LANES && next > 1e-07; ++lane)
         if (size[lane] > 1e-07) e->v_mean[0][lane] = HUGE_VAL;

@@ -12,7 +12,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 91cd27a69dbe7ade5a47e3c34bab93d911a2e2e68e6f9c3d9eea3b9af02c6efa
+ * body-sha256: 506bcba8f83f31b464ff90434df1fb6726cc63b8589d6b667eb5cbb7ecc1e1de
  */
 #include "sir_final_size.h"
 
@@ -1127,7 +1127,8 @@ static void sir_final_size_settle(sir_final_size_lanes coef[restrict], sir_final
             for (int lane = 0; lane < sir_final_size_LANES; ++lane) model->middle[i][lane] = -e->mean[i][lane];
         sir_final_size_begin_at(coef, model, e);
         sir_final_size_extend(coef, e, 1e-4 * left);
-        for (int lane = 0; lane < sir_final_size_LANES; ++lane) size[lane] = 0.0, norm[lane] = DBL_MIN;
+        memset(size, 0, sizeof size);
+        memset(norm, 0, sizeof norm);
         for (int i = 0; i < 3; ++i) {
             sir_final_size_EACH_LANE
             for (int lane = 0; lane < sir_final_size_LANES; ++lane) {
@@ -1135,7 +1136,7 @@ static void sir_final_size_settle(sir_final_size_lanes coef[restrict], sir_final
                 norm[lane] += fabs(model->y[i][lane]);
             }
         }
-        for (int lane = 0; lane < sir_final_size_LANES; ++lane) size[lane] /= norm[lane];
+        for (int lane = 0; lane < sir_final_size_LANES; ++lane) size[lane] /= norm[lane] + DBL_MIN;
         left = sir_final_size_largest_finite(size);
         if (left > 1.0) left = 1.0;
     }
@@ -1267,9 +1268,9 @@ static void sir_final_size_vary(sir_final_size_lanes coef[restrict], sir_final_s
         sir_final_size_vary_order(e, k);
         if (k % 2 == 0) continue;
         sir_final_size_add_slopes(e, k, size);
-        next = sir_final_size_largest_finite(size);
-        next *= next / largest;
+        const double previous = largest;
         largest = sir_final_size_largest_finite(size);
+        next = largest * (largest / previous);
     }
     for (int lane = 0; lane < sir_final_size_LANES && next > 1e-07; ++lane)
         if (size[lane] > 1e-07) e->v_mean[0][lane] = HUGE_VAL;

@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 9e47b3f108ec965b8b3d391ecba7eddf80e22391f548fb26c92db67171aebb42
+ * body-sha256: 4c9dd1cb0ba05b8f2ad64f9d7c2da1f478363f1d7fe6ad78b967cdbede62c8c1
  */
 #include "sklyanin_gyrostat.h"
 
@@ -1833,7 +1833,8 @@ static void sklyanin_gyrostat_settle(sklyanin_gyrostat_lanes coef[restrict], skl
             for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) model->middle[i][lane] = -e->mean[i][lane];
         sklyanin_gyrostat_begin_at(coef, model, e);
         sklyanin_gyrostat_extend(coef, e, 1e-4 * left);
-        for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) size[lane] = 0.0, norm[lane] = DBL_MIN;
+        memset(size, 0, sizeof size);
+        memset(norm, 0, sizeof norm);
         for (int i = 0; i < 4; ++i) {
             sklyanin_gyrostat_EACH_LANE
             for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) {
@@ -1841,7 +1842,7 @@ static void sklyanin_gyrostat_settle(sklyanin_gyrostat_lanes coef[restrict], skl
                 norm[lane] += fabs(model->y[i][lane]);
             }
         }
-        for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) size[lane] /= norm[lane];
+        for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) size[lane] /= norm[lane] + DBL_MIN;
         left = sklyanin_gyrostat_largest_finite(size);
         if (left > 1.0) left = 1.0;
     }
@@ -2007,9 +2008,9 @@ static void sklyanin_gyrostat_vary(sklyanin_gyrostat_lanes coef[restrict], sklya
         sklyanin_gyrostat_vary_order(e, k);
         if (k % 2 == 0) continue;
         sklyanin_gyrostat_add_slopes(e, k, size);
-        next = sklyanin_gyrostat_largest_finite(size);
-        next *= next / largest;
+        const double previous = largest;
         largest = sklyanin_gyrostat_largest_finite(size);
+        next = largest * (largest / previous);
     }
     for (int lane = 0; lane < sklyanin_gyrostat_LANES && next > 1e-07; ++lane)
         if (size[lane] > 1e-07) e->v_mean[0][lane] = HUGE_VAL;

@@ -11,6 +11,7 @@ from phigen.scheme.gauge import kernels as gauge_kernels
 from phigen.scheme.generating import STEP
 from phigen.scheme.kernels import inverse, observables, path_kernels, step_kernels
 from phigen.scheme.lowering import cost, operation_counts
+from phigen.scheme.mean import along_mean
 from phigen.scheme.modified import modified_kernel
 from phigen.scheme.order import Order
 from phigen.scheme.path import build_path, build_slopes
@@ -53,7 +54,8 @@ def build_program(
         kernels = path_kernels(system, generating, coefficients)
         if solver.lanes and system.dimension <= MOST_IN_LANES:
             slopes = build_slopes(system, coefficients)
-            kernels |= {"curvature": curvature(system, generating, coefficients), "invert": inverse(system.dimension)}
+            kernels["curvature"] = curvature(system, generating, coefficients)
+            kernels |= {"along_mean": along_mean(system.dimension), "invert": inverse(system.dimension)}
     else:
         kernels = step_kernels(system, realisation, generating, coefficients)
     if extras.tangent:

@@ -8,9 +8,8 @@ from typing import Any
 from phigen.scheme.lowering import expand_powers
 from phigen.scheme.path import Entry, PathSlopes, Series, Term
 from phigen.scheme.program import Kernel, Output, Program
-from phigen.scheme.step import Matrix, inversion
 from phigen.series.hamilton_jacobi import momentum
-from phigen.symbolic.expression import ONE, ZERO, Expression, substitute, symbol, total
+from phigen.symbolic.expression import Expression, substitute, symbol
 from phigen.targets.c.kernels import FUNCTIONS, each_lane, printer
 from phigen.targets.names import Scope
 from phigen.targets.rendering import render
@@ -82,57 +81,9 @@ def kernels(program: Program) -> list[Kernel]:
             },
             (Output("slope", further[0]), Output("slope_fixed", further[1])),
         ),
-        _along_mean(program.dimension),
+        program.kernels["along_mean"],
         program.kernels["invert"],
     ]
-
-
-def _along_mean(n: int) -> Kernel:
-    """Derivatives along the mean y of a path, from those of its ends and mean along its middle m and along p.
-
-    For p held fixed m follows y by M⁻¹, M the derivative of the mean along m; with p = ∇S_h(y) by M⁻¹ (1 − N H), N that
-    along p and H the Hessian of S_h.
-    """
-    inputs = {name: tuple(f"{name}:{i}" for i in range(2 * n * n)) for name in ("even", "odd", "mean")}
-    inputs["hessian"] = tuple(f"hessian:{i}" for i in range(n * n))
-    hessian = _matrix([symbol(s) for s in inputs["hessian"]], n, n, 0)
-    even, odd, mean = ([symbol(s) for s in inputs[name]] for name in ("even", "odd", "mean"))
-    start, change = [a - b for a, b in zip(even, odd, strict=True)], [2 * b for b in odd]
-    inverse, reciprocals = _inverse(_matrix(mean, n, 2 * n, 0))
-    follows = _times(inverse, _plus(_identity(n), _times(_matrix(mean, n, 2 * n, n), hessian), -1))
-    fixed, along = [], []
-    for value in (start, change):
-        by_m, by_p = _matrix(value, n, 2 * n, 0), _matrix(value, n, 2 * n, n)
-        fixed.append(_times(by_m, inverse))
-        along.append(_plus(_times(by_m, follows), _times(by_p, hessian)))
-    named = zip(("alpha_y", "increment_y", "jacobian", "increment_jacobian"), (*fixed, *along), strict=True)
-    outputs = [Output(name, tuple(e for row in matrix for e in row)) for name, matrix in named]
-    purpose = "derivatives along the mean of a path"
-    return Kernel("along_mean", purpose, inputs, (*outputs, Output("reciprocal", tuple(reciprocals))))
-
-
-def _matrix(values: Sequence[Expression], n: int, width: int, first: int) -> Matrix:
-    return [[values[i * width + first + j] for j in range(n)] for i in range(n)]
-
-
-def _identity(n: int) -> Matrix:
-    return [[ONE if i == j else ZERO for j in range(n)] for i in range(n)]
-
-
-def _plus(a: Matrix, b: Matrix, sign: int = 1) -> Matrix:
-    return [[x + y if sign > 0 else x - y for x, y in zip(r, q, strict=True)] for r, q in zip(a, b, strict=True)]
-
-
-def _times(a: Matrix, b: Matrix) -> Matrix:
-    return [[total(x * r[j] for x, r in zip(row, b, strict=True)) for j in range(len(b))] for row in a]
-
-
-def _inverse(a: Matrix) -> tuple[Matrix, list[Expression]]:
-    n = len(a)
-    inverse, _, reciprocals = inversion(n)
-    values = {f"J:{i}:{j}": a[i][j] for i in range(n) for j in range(n)}
-    done = substitute([*inverse, *reciprocals], values)
-    return _matrix(done, n, n, 0), done[n * n :]
 
 
 def pieces(program: Program, values: Mapping[str, Any], slope_terms: int) -> list[str]:

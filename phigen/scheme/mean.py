@@ -1,0 +1,62 @@
+"""Derivatives along the mean of a path, where it is its middle that the path is expanded about.
+
+Let the path take the time −1 … 1 under p/2, so that it starts at α and ends at β. With even and odd the sums of the
+terms of its Taylor series of even and odd order, α = even − odd and β − α = 2 odd, and likewise for derivatives: each
+is an n×2n matrix, along the middle m, then along p.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from phigen.scheme.program import Kernel, Output
+from phigen.scheme.step import Matrix, inversion
+from phigen.symbolic.expression import ONE, ZERO, Expression, substitute, symbol, total
+
+
+def along_mean(n: int) -> Kernel:
+    """Derivatives of the ends of a path in n coordinates along its mean y, from those along its middle m and along p.
+
+    For p held fixed m follows y by M⁻¹, M the derivative of the mean along m; with p = ∇S_h(y) by M⁻¹ (1 − N H), N that
+    along p and H the Hessian of S_h.
+    """
+    inputs = {name: tuple(f"{name}:{i}" for i in range(2 * n * n)) for name in ("even", "odd", "mean")}
+    inputs["hessian"] = tuple(f"hessian:{i}" for i in range(n * n))
+    hessian = _matrix([symbol(s) for s in inputs["hessian"]], n, n, 0)
+    even, odd, mean = ([symbol(s) for s in inputs[name]] for name in ("even", "odd", "mean"))
+    start, change = [a - b for a, b in zip(even, odd, strict=True)], [2 * b for b in odd]
+    inverse, reciprocals = _inverse(_matrix(mean, n, 2 * n, 0))
+    follows = _times(inverse, _plus(_identity(n), _times(_matrix(mean, n, 2 * n, n), hessian), -1))
+    fixed, along = [], []
+    for value in (start, change):
+        by_m, by_p = _matrix(value, n, 2 * n, 0), _matrix(value, n, 2 * n, n)
+        fixed.append(_times(by_m, inverse))
+        along.append(_plus(_times(by_m, follows), _times(by_p, hessian)))
+    named = zip(("alpha_y", "increment_y", "jacobian", "increment_jacobian"), (*fixed, *along), strict=True)
+    outputs = [Output(name, tuple(e for row in matrix for e in row)) for name, matrix in named]
+    purpose = "derivatives along the mean of a path"
+    return Kernel("along_mean", purpose, inputs, (*outputs, Output("reciprocal", tuple(reciprocals))))
+
+
+def _matrix(values: Sequence[Expression], n: int, width: int, first: int) -> Matrix:
+    return [[values[i * width + first + j] for j in range(n)] for i in range(n)]
+
+
+def _identity(n: int) -> Matrix:
+    return [[ONE if i == j else ZERO for j in range(n)] for i in range(n)]
+
+
+def _plus(a: Matrix, b: Matrix, sign: int = 1) -> Matrix:
+    return [[x + y if sign > 0 else x - y for x, y in zip(r, q, strict=True)] for r, q in zip(a, b, strict=True)]
+
+
+def _times(a: Matrix, b: Matrix) -> Matrix:
+    return [[total(x * r[j] for x, r in zip(row, b, strict=True)) for j in range(len(b))] for row in a]
+
+
+def _inverse(a: Matrix) -> tuple[Matrix, list[Expression]]:
+    n = len(a)
+    inverse, _, reciprocals = inversion(n)
+    values = {f"J:{i}:{j}": a[i][j] for i in range(n) for j in range(n)}
+    done = substitute([*inverse, *reciprocals], values)
+    return _matrix(done, n, n, 0), done[n * n :]
