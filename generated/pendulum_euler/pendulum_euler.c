@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 9b8c689087298e6f25a2e6ad70dcbb31395171680231772e9580a96a4581d54e
+ * body-sha256: 5b48cf3a3ddd678076464cf173119acf8f02cc23a32d90255eb9fb3bf6fdecbb
  */
 #include "pendulum_euler.h"
 
@@ -153,7 +153,7 @@ typedef double pendulum_euler_lanes[pendulum_euler_LANES];
 #endif
 
 #if defined(__clang__)
-#define pendulum_euler_EACH_LANE _Pragma("clang loop vectorize(assume_safety)")
+#define pendulum_euler_EACH_LANE _Pragma("clang loop vectorize(assume_safety) unroll(disable)")
 #pragma clang diagnostic push
 #pragma clang diagnostic ignored "-Wpass-failed"
 #elif defined(__GNUC__)

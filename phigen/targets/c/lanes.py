@@ -123,6 +123,7 @@ def values(program: Program, memory: Mapping[str, int]) -> Mapping[str, object]:
         else "Each is integrated by itself.",
         "ensemble_templates": _GROUPS if grouped else ("ensemble_members",),
         "group_size": "LANES",
+        "clang_loop": "vectorize(assume_safety)",
         "block_members": _MEMBERS if blocks(program) else [],
         **_group_values(program),
         "block_reset": _RESET if blocks(program) else [],

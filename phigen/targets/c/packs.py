@@ -73,6 +73,8 @@ def values(program: Program) -> Mapping[str, object]:
         "packs": PACKS,
         "stretch": STRETCH,
         "group_size": "GROUP",
+        # Loops over lanes that clang unrolls first make it look for vectors in the loops around them.
+        "clang_loop": "vectorize(assume_safety) unroll(disable)",
         "group_members": ["int far;   /* whether arguments of functions are too large for polynomials */"] * far,
         "attempts": two if far else one,
         "ensemble_how": f"{PACKS * LANES} are integrated\n   side by side, and with OpenMP such groups in parallel.",
