@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 446df0ff527ef5c32d81d6d08d14b2b06a55071b8c9c5e5f461ddc429b038ddd
+ * body-sha256: 36a40b927c8cb656fc6588719dba3c900aa7257554ba92d290d55dc2a0877f25
  */
 #include "ablowitz_ladik3.h"
 
@@ -206,12 +206,12 @@ static void ablowitz_ladik3_judge(ablowitz_ladik3_memory *memory, const double v
             memory->order = order;
         }
     }
-    memory->fitting = memory->fits > 0;
+    memory->fitting = memory->terms > 0;
     if (memory->fitting && ablowitz_ladik3_predict(memory, guess)) {
         fitted = 0.0;
         for (int i = 0; i < 6; ++i) fitted += fabs(value[i] - guess[i]);
     }
-    memory->fitting = memory->fits > 0 && fitted <= least;
+    memory->fitting = memory->terms > 0 && fitted <= least;
     if (memory->order == 0) memory->order = 1;
 }
 
@@ -237,12 +237,27 @@ static void ablowitz_ladik3_project(int rows, double (*one)[8], int column, doub
     }
 }
 
+/* By how much recurrences miss the last of these values. */
+static double ablowitz_ladik3_missed(const double *value, double (*weight)[8])
+{
+    enum { AHEAD = 1, WINDOW = 32, CHECKS = 8 };
+    double most = 0.0;
+    for (int i = 0; i < CHECKS; ++i) {
+        double guess[8] = { 0.0 };
+        for (int k = 0; k < WINDOW; ++k)
+            for (int l = 0; l < 8; ++l) guess[l] += weight[k][l] * value[i + WINDOW - 1 - k];
+        for (int l = 0; l < AHEAD; ++l) most = fmax(most, fabs(guess[l] - value[i + WINDOW + l]));
+    }
+    return most;
+}
+
 /* Fit the recurrences value[m + l] = sum of weight[k][..][l] * value[m - 1 - k], l = 0 ... 1 - 1, to the history of
    a component: ridge least squares by modified Gram-Schmidt, the ridge at the level of rounding. Columns are taken in by
-   eights, until they leave next to nothing of the right-hand sides. How many past values are used. */
+   eights, until they leave next to nothing of the right-hand sides. How many past values are used; 0 if the recurrences do
+   not foresee the last values, which they were not fitted to. */
 static int ablowitz_ladik3_train(ablowitz_ladik3_memory *memory, int component)
 {
-    enum { AHEAD = 1, WINDOW = 32, ROWS = 64 };
+    enum { AHEAD = 1, WINDOW = 32, ROWS = 56 };
     double q[WINDOW / 8][ROWS + WINDOW][8], r[WINDOW / 8][WINDOW][8], inverse[WINDOW]; /* eight columns in each part */
     double right[ROWS + WINDOW][8], weight[WINDOW][8], value[96], largest = 0.0, left = HUGE_VAL;
     int terms = 0;
@@ -275,7 +290,7 @@ static int ablowitz_ladik3_train(ablowitz_ladik3_memory *memory, int component)
         for (int j = k + 1; j < terms; ++j)
             for (int l = 0; l < 8; ++l) weight[k][l] -= r[j / 8][k][j % 8] * weight[j][l];
     for (int k = 0; k < WINDOW; ++k) memcpy(memory->weight[k][component], weight[k], AHEAD * sizeof(double));
-    return terms;
+    return ablowitz_ladik3_missed(value + ROWS, weight) <= 1e-07 * largest ? terms : 0;
 }
 
 /* Drop what is old, if so many values would not fit into the history. */
@@ -296,12 +311,15 @@ static void ablowitz_ladik3_record(ablowitz_ladik3_memory *memory, const double 
 /* Fit the recurrence to the last values; with every time, wait longer before it is done again. */
 static void ablowitz_ladik3_fit(ablowitz_ladik3_memory *memory)
 {
+    int found = 1;
     memory->terms = 0;
-    for (int i = 0; i < 6; ++i) {
+    for (int i = 0; i < 6 && found; ++i) {
         const int terms = ablowitz_ladik3_train(memory, i);
+        found = terms > 0;
         if (terms > memory->terms) memory->terms = terms;
     }
-    memory->fitting = 1;
+    if (!found) memory->terms = 0;
+    memory->fitting = found;
     ++memory->fits;
     memory->slow = 0;
     memory->patience = memory->patience < 10000 ? 2 * memory->patience + 150 : 20000;

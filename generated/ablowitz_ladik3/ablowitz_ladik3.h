@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 351c71647be1dfaf6b770eb70671e53740e5c19c66c16232764abb0c96e09710
+ * body-sha256: 67bb282e4ce8bf837f0e89008c2b277fbad735cbcf1899c804fe57af67a01f4f
  */
 #ifndef ABLOWITZ_LADIK3_H
 #define ABLOWITZ_LADIK3_H
@@ -51,7 +51,7 @@ typedef enum {
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
-    int terms;    /* how many of them the recurrence uses */
+    int terms;    /* how many of them the recurrence uses; 0 if there is none */
     int fits;     /* how often weight has been fitted */
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */

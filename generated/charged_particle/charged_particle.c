@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 727afd51698be63fbcd17e19b3df586d6d746c467078086dd4a4242493873083
+ * body-sha256: 57717703cc05221b3fce2bf1c9ebb64c385ddb78564fec8c8cf6f07e573e5526
  */
 #include "charged_particle.h"
 
@@ -222,12 +222,12 @@ static void charged_particle_judge(charged_particle_memory *memory, const double
             memory->order = order;
         }
     }
-    memory->fitting = memory->fits > 0;
+    memory->fitting = memory->terms > 0;
     if (memory->fitting && charged_particle_predict(memory, guess)) {
         fitted = 0.0;
         for (int i = 0; i < 6; ++i) fitted += fabs(value[i] - guess[i]);
     }
-    memory->fitting = memory->fits > 0 && fitted <= least;
+    memory->fitting = memory->terms > 0 && fitted <= least;
     if (memory->order == 0) memory->order = 1;
 }
 
@@ -253,12 +253,27 @@ static void charged_particle_project(int rows, double (*one)[8], int column, dou
     }
 }
 
+/* By how much recurrences miss the last of these values. */
+static double charged_particle_missed(const double *value, double (*weight)[8])
+{
+    enum { AHEAD = 1, WINDOW = 32, CHECKS = 8 };
+    double most = 0.0;
+    for (int i = 0; i < CHECKS; ++i) {
+        double guess[8] = { 0.0 };
+        for (int k = 0; k < WINDOW; ++k)
+            for (int l = 0; l < 8; ++l) guess[l] += weight[k][l] * value[i + WINDOW - 1 - k];
+        for (int l = 0; l < AHEAD; ++l) most = fmax(most, fabs(guess[l] - value[i + WINDOW + l]));
+    }
+    return most;
+}
+
 /* Fit the recurrences value[m + l] = sum of weight[k][..][l] * value[m - 1 - k], l = 0 ... 1 - 1, to the history of
    a component: ridge least squares by modified Gram-Schmidt, the ridge at the level of rounding. Columns are taken in by
-   eights, until they leave next to nothing of the right-hand sides. How many past values are used. */
+   eights, until they leave next to nothing of the right-hand sides. How many past values are used; 0 if the recurrences do
+   not foresee the last values, which they were not fitted to. */
 static int charged_particle_train(charged_particle_memory *memory, int component)
 {
-    enum { AHEAD = 1, WINDOW = 32, ROWS = 64 };
+    enum { AHEAD = 1, WINDOW = 32, ROWS = 56 };
     double q[WINDOW / 8][ROWS + WINDOW][8], r[WINDOW / 8][WINDOW][8], inverse[WINDOW]; /* eight columns in each part */
     double right[ROWS + WINDOW][8], weight[WINDOW][8], value[96], largest = 0.0, left = HUGE_VAL;
     int terms = 0;
@@ -291,7 +306,7 @@ static int charged_particle_train(charged_particle_memory *memory, int component
         for (int j = k + 1; j < terms; ++j)
             for (int l = 0; l < 8; ++l) weight[k][l] -= r[j / 8][k][j % 8] * weight[j][l];
     for (int k = 0; k < WINDOW; ++k) memcpy(memory->weight[k][component], weight[k], AHEAD * sizeof(double));
-    return terms;
+    return charged_particle_missed(value + ROWS, weight) <= 1e-07 * largest ? terms : 0;
 }
 
 /* Drop what is old, if so many values would not fit into the history. */
@@ -312,12 +327,15 @@ static void charged_particle_record(charged_particle_memory *memory, const doubl
 /* Fit the recurrence to the last values; with every time, wait longer before it is done again. */
 static void charged_particle_fit(charged_particle_memory *memory)
 {
+    int found = 1;
     memory->terms = 0;
-    for (int i = 0; i < 6; ++i) {
+    for (int i = 0; i < 6 && found; ++i) {
         const int terms = charged_particle_train(memory, i);
+        found = terms > 0;
         if (terms > memory->terms) memory->terms = terms;
     }
-    memory->fitting = 1;
+    if (!found) memory->terms = 0;
+    memory->fitting = found;
     ++memory->fits;
     memory->slow = 0;
     memory->patience = memory->patience < 10000 ? 2 * memory->patience + 150 : 20000;

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 0a87d2107cc3f67787f8bada64cd8a0056d5a0df53196bf3c1b7428b99aa541d
+ * body-sha256: 3c58ee02b1e2104f4494363aa1607e64d0021c19fef00473f7105282a9b56059
  */
 #ifndef CHARGED_PARTICLE_H
 #define CHARGED_PARTICLE_H
@@ -50,7 +50,7 @@ typedef enum {
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
-    int terms;    /* how many of them the recurrence uses */
+    int terms;    /* how many of them the recurrence uses; 0 if there is none */
     int fits;     /* how often weight has been fitted */
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */

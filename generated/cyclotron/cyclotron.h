@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 7cb35cf99c716288fb0e9242a30b39388efbf8e45ff835a956efb64f401562eb
+ * body-sha256: abb68f2b12b4f902d509028b4f4b2c1721d17e1166dfe3b985f54d12de55579c
  */
 #ifndef CYCLOTRON_H
 #define CYCLOTRON_H
@@ -50,7 +50,7 @@ typedef enum {
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
-    int terms;    /* how many of them the recurrence uses */
+    int terms;    /* how many of them the recurrence uses; 0 if there is none */
     int fits;     /* how often weight has been fitted */
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 2cf91eb79dc9ee3aea2d0f601bc45fb5d0ba12fe2d4cc8ba2bd393c743b0e343
+ * body-sha256: 3568d1a0cc59c33b8a546beed12668c49a4812fe1f944908c36d0fe5c1d274ff
  */
 #ifndef ENGEL_GEODESICS_H
 #define ENGEL_GEODESICS_H
@@ -50,7 +50,7 @@ typedef enum {
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
-    int terms;    /* how many of them the recurrence uses */
+    int terms;    /* how many of them the recurrence uses; 0 if there is none */
     int fits;     /* how often weight has been fitted */
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */

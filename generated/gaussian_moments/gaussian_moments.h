@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: bc85a8a080f3cf41dc2bdc196fa529fb651779d03d50153bbab9de9f988fa983
+ * body-sha256: 69edba38730acb58d9fde6216c623095b08618e72d6121462d716897057d8685
  */
 #ifndef GAUSSIAN_MOMENTS_H
 #define GAUSSIAN_MOMENTS_H
@@ -51,7 +51,7 @@ typedef enum {
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
-    int terms;    /* how many of them the recurrence uses */
+    int terms;    /* how many of them the recurrence uses; 0 if there is none */
     int fits;     /* how often weight has been fitted */
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */

@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: a851e8dac613fa9b09cc131f272140f42dedeb5484c102cb8b7b2377e68e7022
+ * body-sha256: 96d5980c8705ceb99c0c7fd30262a60efc935874cb6a8dc82c70897176389c79
  */
 #include "guiding_centre.h"
 
@@ -224,12 +224,12 @@ static void guiding_centre_judge(guiding_centre_memory *memory, const double val
             memory->order = order;
         }
     }
-    memory->fitting = memory->fits > 0;
+    memory->fitting = memory->terms > 0;
     if (memory->fitting && guiding_centre_predict(memory, guess)) {
         fitted = 0.0;
         for (int i = 0; i < 4; ++i) fitted += fabs(value[i] - guess[i]);
     }
-    memory->fitting = memory->fits > 0 && fitted <= least;
+    memory->fitting = memory->terms > 0 && fitted <= least;
     if (memory->order == 0) memory->order = 1;
 }
 
@@ -255,12 +255,27 @@ static void guiding_centre_project(int rows, double (*one)[8], int column, doubl
     }
 }
 
+/* By how much recurrences miss the last of these values. */
+static double guiding_centre_missed(const double *value, double (*weight)[8])
+{
+    enum { AHEAD = 8, WINDOW = 32, CHECKS = 8 };
+    double most = 0.0;
+    for (int i = 0; i < CHECKS; ++i) {
+        double guess[8] = { 0.0 };
+        for (int k = 0; k < WINDOW; ++k)
+            for (int l = 0; l < 8; ++l) guess[l] += weight[k][l] * value[i + WINDOW - 1 - k];
+        for (int l = 0; l < AHEAD; ++l) most = fmax(most, fabs(guess[l] - value[i + WINDOW + l]));
+    }
+    return most;
+}
+
 /* Fit the recurrences value[m + l] = sum of weight[k][..][l] * value[m - 1 - k], l = 0 ... 8 - 1, to the history of
    a component: ridge least squares by modified Gram-Schmidt, the ridge at the level of rounding. Columns are taken in by
-   eights, until they leave next to nothing of the right-hand sides. How many past values are used. */
+   eights, until they leave next to nothing of the right-hand sides. How many past values are used; 0 if the recurrences do
+   not foresee the last values, which they were not fitted to. */
 static int guiding_centre_train(guiding_centre_memory *memory, int component)
 {
-    enum { AHEAD = 8, WINDOW = 32, ROWS = 56 };
+    enum { AHEAD = 8, WINDOW = 32, ROWS = 48 };
     double q[WINDOW / 8][ROWS + WINDOW][8], r[WINDOW / 8][WINDOW][8], inverse[WINDOW]; /* eight columns in each part */
     double right[ROWS + WINDOW][8], weight[WINDOW][8], value[95], largest = 0.0, left = HUGE_VAL;
     int terms = 0;
@@ -293,7 +308,7 @@ static int guiding_centre_train(guiding_centre_memory *memory, int component)
         for (int j = k + 1; j < terms; ++j)
             for (int l = 0; l < 8; ++l) weight[k][l] -= r[j / 8][k][j % 8] * weight[j][l];
     for (int k = 0; k < WINDOW; ++k) memcpy(memory->weight[k][component], weight[k], AHEAD * sizeof(double));
-    return terms;
+    return guiding_centre_missed(value + ROWS, weight) <= 1e-07 * largest ? terms : 0;
 }
 
 /* Drop what is old, if so many values would not fit into the history. */
@@ -314,12 +329,15 @@ static void guiding_centre_record(guiding_centre_memory *memory, const double va
 /* Fit the recurrence to the last values; with every time, wait longer before it is done again. */
 static void guiding_centre_fit(guiding_centre_memory *memory)
 {
+    int found = 1;
     memory->terms = 0;
-    for (int i = 0; i < 4; ++i) {
+    for (int i = 0; i < 4 && found; ++i) {
         const int terms = guiding_centre_train(memory, i);
+        found = terms > 0;
         if (terms > memory->terms) memory->terms = terms;
     }
-    memory->fitting = 1;
+    if (!found) memory->terms = 0;
+    memory->fitting = found;
     ++memory->fits;
     memory->slow = 0;
     memory->patience = memory->patience < 10000 ? 2 * memory->patience + 150 : 20000;
@@ -2568,6 +2586,14 @@ static int guiding_centre_block(guiding_centre_solver *s, guiding_centre_table *
     return passes;
 }
 
+/* Recurrences are given up for a while, the longer the more often that happens. */
+static void guiding_centre_give_up(guiding_centre_solver *s)
+{
+    s->foreseeing = s->setback = s->pause = 0;
+    s->doubt = 2 * s->doubt + 600;
+    s->retry = s->steps + s->doubt;
+}
+
 /* How the next block is guessed: by recurrences, fitted as soon as enough steps are to be made, or
    have been, to repay that. */
 static void guiding_centre_choose_guess(guiding_centre_solver *s, size_t steps)
@@ -2578,13 +2604,17 @@ static void guiding_centre_choose_guess(guiding_centre_solver *s, size_t steps)
             return;
         }
     if (s->foreseeing || (steps < 600 && s->steps < 150) || s->steps < s->retry) return;
-    for (int stage = 0; stage < 5; ++stage) guiding_centre_fit(&s->memory[stage]);
     s->foreseeing = 1;
+    for (int stage = 0; stage < 5 && s->foreseeing; ++stage) {
+        guiding_centre_fit(&s->memory[stage]);
+        s->foreseeing = s->memory[stage].terms > 0;
+    }
     s->pause = guiding_centre_LANES;
+    if (!s->foreseeing) guiding_centre_give_up(s);
 }
 
 /* Learn from a block: after one that failed single steps are made, the more the more often that happens. Recurrences
-   that fail repeatedly, or need more passes than steps by Runge-Kutta did, are given up for a while. */
+   that fail repeatedly, or need more passes than steps by Runge-Kutta did, are given up. */
 static void guiding_centre_learn_from(guiding_centre_solver *s, int passes)
 {
     if (passes > 0) {
@@ -2596,9 +2626,7 @@ static void guiding_centre_learn_from(guiding_centre_solver *s, int passes)
     if (!s->foreseeing) {
         s->passes = passes > 0 ? passes : INT_MAX;
     } else if (passes > s->passes || s->setback > 5 * guiding_centre_LANES) {
-        s->foreseeing = s->setback = s->pause = 0;
-        s->doubt = 2 * s->doubt + 600;
-        s->retry = s->steps + s->doubt;
+        guiding_centre_give_up(s);
     }
 }
 

@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: c404c717c19ba06cc4806a1d4a0e05e32d57c13058abac8461657f441ab7c955
+ * body-sha256: 353b4e4fb45b76f57986068fca086f4faba8419de715ff5af18a4db47faf3cba
  */
 #ifndef GUIDING_CENTRE_H
 #define GUIDING_CENTRE_H
@@ -53,7 +53,7 @@ typedef enum {
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
-    int terms;    /* how many of them the recurrence uses */
+    int terms;    /* how many of them the recurrence uses; 0 if there is none */
     int fits;     /* how often weight has been fitted */
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */

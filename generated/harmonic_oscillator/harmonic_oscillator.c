@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 9becfea75f16c0c83cfca0423c312a203013905a28b8885c4b1a04c0904d5c90
+ * body-sha256: 46bc58e450e1f1dc448c2a4c42d1ca343e4c79777bcdb992a5f1d61072cfefad
  */
 #include "harmonic_oscillator.h"
 
@@ -175,12 +175,12 @@ static void harmonic_oscillator_judge(harmonic_oscillator_memory *memory, const 
             memory->order = order;
         }
     }
-    memory->fitting = memory->fits > 0;
+    memory->fitting = memory->terms > 0;
     if (memory->fitting && harmonic_oscillator_predict(memory, guess)) {
         fitted = 0.0;
         for (int i = 0; i < 2; ++i) fitted += fabs(value[i] - guess[i]);
     }
-    memory->fitting = memory->fits > 0 && fitted <= least;
+    memory->fitting = memory->terms > 0 && fitted <= least;
     if (memory->order == 0) memory->order = 1;
 }
 
@@ -206,12 +206,27 @@ static void harmonic_oscillator_project(int rows, double (*one)[8], int column, 
     }
 }
 
+/* By how much recurrences miss the last of these values. */
+static double harmonic_oscillator_missed(const double *value, double (*weight)[8])
+{
+    enum { AHEAD = 8, WINDOW = 32, CHECKS = 8 };
+    double most = 0.0;
+    for (int i = 0; i < CHECKS; ++i) {
+        double guess[8] = { 0.0 };
+        for (int k = 0; k < WINDOW; ++k)
+            for (int l = 0; l < 8; ++l) guess[l] += weight[k][l] * value[i + WINDOW - 1 - k];
+        for (int l = 0; l < AHEAD; ++l) most = fmax(most, fabs(guess[l] - value[i + WINDOW + l]));
+    }
+    return most;
+}
+
 /* Fit the recurrences value[m + l] = sum of weight[k][..][l] * value[m - 1 - k], l = 0 ... 8 - 1, to the history of
    a component: ridge least squares by modified Gram-Schmidt, the ridge at the level of rounding. Columns are taken in by
-   eights, until they leave next to nothing of the right-hand sides. How many past values are used. */
+   eights, until they leave next to nothing of the right-hand sides. How many past values are used; 0 if the recurrences do
+   not foresee the last values, which they were not fitted to. */
 static int harmonic_oscillator_train(harmonic_oscillator_memory *memory, int component)
 {
-    enum { AHEAD = 8, WINDOW = 32, ROWS = 56 };
+    enum { AHEAD = 8, WINDOW = 32, ROWS = 48 };
     double q[WINDOW / 8][ROWS + WINDOW][8], r[WINDOW / 8][WINDOW][8], inverse[WINDOW]; /* eight columns in each part */
     double right[ROWS + WINDOW][8], weight[WINDOW][8], value[95], largest = 0.0, left = HUGE_VAL;
     int terms = 0;
@@ -244,7 +259,7 @@ static int harmonic_oscillator_train(harmonic_oscillator_memory *memory, int com
         for (int j = k + 1; j < terms; ++j)
             for (int l = 0; l < 8; ++l) weight[k][l] -= r[j / 8][k][j % 8] * weight[j][l];
     for (int k = 0; k < WINDOW; ++k) memcpy(memory->weight[k][component], weight[k], AHEAD * sizeof(double));
-    return terms;
+    return harmonic_oscillator_missed(value + ROWS, weight) <= 1e-07 * largest ? terms : 0;
 }
 
 /* Drop what is old, if so many values would not fit into the history. */
@@ -265,12 +280,15 @@ static void harmonic_oscillator_record(harmonic_oscillator_memory *memory, const
 /* Fit the recurrence to the last values; with every time, wait longer before it is done again. */
 static void harmonic_oscillator_fit(harmonic_oscillator_memory *memory)
 {
+    int found = 1;
     memory->terms = 0;
-    for (int i = 0; i < 2; ++i) {
+    for (int i = 0; i < 2 && found; ++i) {
         const int terms = harmonic_oscillator_train(memory, i);
+        found = terms > 0;
         if (terms > memory->terms) memory->terms = terms;
     }
-    memory->fitting = 1;
+    if (!found) memory->terms = 0;
+    memory->fitting = found;
     ++memory->fits;
     memory->slow = 0;
     memory->patience = memory->patience < 10000 ? 2 * memory->patience + 150 : 20000;
@@ -770,6 +788,14 @@ static int harmonic_oscillator_block(harmonic_oscillator_solver *s, harmonic_osc
     return passes;
 }
 
+/* Recurrences are given up for a while, the longer the more often that happens. */
+static void harmonic_oscillator_give_up(harmonic_oscillator_solver *s)
+{
+    s->foreseeing = s->setback = s->pause = 0;
+    s->doubt = 2 * s->doubt + 600;
+    s->retry = s->steps + s->doubt;
+}
+
 /* How the next block is guessed: by recurrences, fitted as soon as enough steps are to be made, or
    have been, to repay that. */
 static void harmonic_oscillator_choose_guess(harmonic_oscillator_solver *s, size_t steps)
@@ -780,13 +806,17 @@ static void harmonic_oscillator_choose_guess(harmonic_oscillator_solver *s, size
             return;
         }
     if (s->foreseeing || (steps < 600 && s->steps < 150) || s->steps < s->retry) return;
-    for (int stage = 0; stage < 1; ++stage) harmonic_oscillator_fit(&s->memory[stage]);
     s->foreseeing = 1;
+    for (int stage = 0; stage < 1 && s->foreseeing; ++stage) {
+        harmonic_oscillator_fit(&s->memory[stage]);
+        s->foreseeing = s->memory[stage].terms > 0;
+    }
     s->pause = harmonic_oscillator_LANES;
+    if (!s->foreseeing) harmonic_oscillator_give_up(s);
 }
 
 /* Learn from a block: after one that failed single steps are made, the more the more often that happens. Recurrences
-   that fail repeatedly, or need more passes than steps by Runge-Kutta did, are given up for a while. */
+   that fail repeatedly, or need more passes than steps by Runge-Kutta did, are given up. */
 static void harmonic_oscillator_learn_from(harmonic_oscillator_solver *s, int passes)
 {
     if (passes > 0) {
@@ -798,9 +828,7 @@ static void harmonic_oscillator_learn_from(harmonic_oscillator_solver *s, int pa
     if (!s->foreseeing) {
         s->passes = passes > 0 ? passes : INT_MAX;
     } else if (passes > s->passes || s->setback > 5 * harmonic_oscillator_LANES) {
-        s->foreseeing = s->setback = s->pause = 0;
-        s->doubt = 2 * s->doubt + 600;
-        s->retry = s->steps + s->doubt;
+        harmonic_oscillator_give_up(s);
     }
 }
 
@@ -850,13 +878,14 @@ typedef struct {
     int slow;       /* how many of the last steps took more than one iteration */
     int patience;   /* how many of those before recurrences are fitted again */
     int active[8];  /* whether the lane has a member that has not failed */
-    size_t left[8]; /* steps that it has still to make */
+    size_t left[8]; /* steps that are still to be made, where one has */
 } harmonic_oscillator_group;
 
 /* The past values of a stage, the latest for k = 0. */
 static harmonic_oscillator_lanes *harmonic_oscillator_group_past(harmonic_oscillator_group *group, int stage, int k)
 {
-    return group->past[stage][(group->latest + k) % 95];
+    const int row = group->latest + k;
+    return group->past[stage][row < 95 ? row : row - 95];
 }
 
 /* Guess the values of a stage by the recurrences of the members. */
@@ -923,7 +952,7 @@ static void harmonic_oscillator_group_judge(harmonic_oscillator_group *group, in
             group->order[stage] = order;
         }
     }
-    if (group->fits == 0) return;
+    if (group->terms[stage] == 0) return;
     harmonic_oscillator_group_foresee(group, stage, row[0]);
     harmonic_oscillator_group_subtract(row[0], y);
     group->fitting[stage] = harmonic_oscillator_group_sum(group, row[0]) <= least;
@@ -937,20 +966,41 @@ static void harmonic_oscillator_group_fit(harmonic_oscillator_group *group)
     const int helped = group->fits == 0 || group->fitting[0];
     memory.count = 95;
     for (int stage = 0; stage < 1; ++stage) {
+        int found = 1;
         group->terms[stage] = 0;
         for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane)
-            for (int i = 0; i < 2 && group->active[lane]; ++i) {
+            for (int i = 0; i < 2 && group->active[lane] && found; ++i) {
                 for (int k = 0; k < 95; ++k)
                     memory.past[95 - 1 - k][i] = harmonic_oscillator_group_past(group, stage, k)[i][lane];
                 const int terms = harmonic_oscillator_train(&memory, i);
+                found = terms > 0;
                 if (terms > group->terms[stage]) group->terms[stage] = terms;
                 for (int k = 0; k < 32; ++k) group->weight[stage][k][i][lane] = memory.weight[k][i][0];
             }
-        group->fitting[stage] = 1;
+        if (!found) group->terms[stage] = 0;
+        group->fitting[stage] = found;
     }
     ++group->fits;
     group->slow = 0;
     group->patience = helped && group->patience < 10000 ? 2 * group->patience + 150 : 100 * 150;
+}
+
+/* Replace guesses that are not near the last values, as harmonic_oscillator_near has it, by these; lane by lane. */
+static void harmonic_oscillator_stay_near(harmonic_oscillator_lanes y[restrict 2], harmonic_oscillator_lanes last[restrict 2])
+{
+    harmonic_oscillator_lanes distance = { 0.0 }, size = { 0.0 };
+    for (int i = 0; i < 2; ++i) {
+        harmonic_oscillator_EACH_LANE
+        for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane) {
+            distance[lane] += fabs(y[i][lane] - last[i][lane]);
+            size[lane] += fabs(last[i][lane]);
+        }
+    }
+    for (int i = 0; i < 2; ++i) {
+        harmonic_oscillator_EACH_LANE
+        for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane)
+            y[i][lane] = distance[lane] <= 4.0 * size[lane] ? y[i][lane] : last[i][lane];
+    }
 }
 
 /* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group.
@@ -959,8 +1009,11 @@ static int harmonic_oscillator_group_open(harmonic_oscillator_group *group, cons
     double bend, harmonic_oscillator_lanes bound)
 {
     int open = 0;
-    for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane) {
+    harmonic_oscillator_EACH_LANE
+    for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane)
         bound[lane] = harmonic_oscillator_remaining(size[lane], bend, bound[lane]);
+    if (harmonic_oscillator_largest(bound) <= 1e-20) return 0;
+    for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane) {
         const int solved = bound[lane] <= 1e-20 || (previous[lane] < 1e-8 && size[lane] < 1e-10);
         if (!isfinite(size[lane])) group->active[lane] = 0;
         open += group->active[lane] && !solved;
@@ -973,15 +1026,7 @@ static void harmonic_oscillator_group_predict(harmonic_oscillator_group *group, 
 {
     if (group->fitting[stage]) harmonic_oscillator_group_foresee(group, stage, y);
     else harmonic_oscillator_group_extrapolate(group, stage, y);
-    for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane) {
-        double guess[2], state[2];
-        for (int i = 0; i < 2; ++i) {
-            guess[i] = y[i][lane];
-            state[i] = group->x[i][lane];
-        }
-        const int near = harmonic_oscillator_near(guess, state);
-        for (int i = 0; i < 2 && !near; ++i) y[i][lane] = state[i];
-    }
+    harmonic_oscillator_stay_near(y, group->x);
 }
 
 /* Newton's method for a stage, until the slowest lane is solved. The number of iterations; where that is the most
@@ -1012,6 +1057,29 @@ static int harmonic_oscillator_group_solve(harmonic_oscillator_group *group, int
     return iterations;
 }
 
+/* Members that failed, or whose state is not finite, keep the state before the step, and leave. How many stay. */
+static int harmonic_oscillator_group_leave(harmonic_oscillator_group *group, harmonic_oscillator_lanes x[2], harmonic_oscillator_lanes carry[2],
+    size_t remaining)
+{
+    harmonic_oscillator_lanes size = { 0.0 };
+    int active = 0;
+    for (int i = 0; i < 2; ++i)
+        for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane) size[lane] += fabs(group->x[i][lane]);
+    for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane) active += group->active[lane];
+    if (active == harmonic_oscillator_LANES && harmonic_oscillator_largest(size) < HUGE_VAL) return active;
+    active = 0;
+    for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane) {
+        group->active[lane] = group->active[lane] && isfinite(size[lane]);
+        active += group->active[lane];
+        for (int i = 0; i < 2 && !group->active[lane]; ++i) {
+            group->x[i][lane] = x[i][lane];
+            group->carry[i][lane] = carry[i][lane];
+        }
+        if (!group->active[lane] && group->left[lane] == 0) group->left[lane] = remaining;
+    }
+    return active;
+}
+
 /* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
 static void harmonic_oscillator_group_advance(harmonic_oscillator_lanes x[restrict 2], harmonic_oscillator_lanes carry[restrict 2],
     harmonic_oscillator_model *model)
@@ -1033,38 +1101,29 @@ static void harmonic_oscillator_group_advance(harmonic_oscillator_lanes x[restri
     }
 }
 
-/* One step of all members, of as many as remain. One that fails keeps its state, and leaves. How many are left. */
+/* One step of all members, of as many as remain. How many members are left. */
 static int harmonic_oscillator_group_step(harmonic_oscillator_group *group, size_t remaining)
 {
     harmonic_oscillator_lanes x[2], carry[2];
     harmonic_oscillator_model model;
-    const int next = (group->latest + 95 - 1) % 95;
-    int active = 0, most = 0;
+    const int next = (group->latest > 0 ? group->latest : 95) - 1;
+    int most = 0;
     memcpy(x, group->x, sizeof x);
     memcpy(carry, group->carry, sizeof carry);
     for (int stage = 0; stage < 1; ++stage) {
         const int iterations = harmonic_oscillator_group_solve(group, stage, &model);
         harmonic_oscillator_group_advance(group->x, group->carry, &model);
-        if (next % 8 == 0 || group->count < 8) harmonic_oscillator_group_judge(group, stage, model.y);
         if (iterations > most) most = iterations;
+        if ((iterations > 1 && next % 8 == 0) || group->count < 8)
+            harmonic_oscillator_group_judge(group, stage, model.y);
         memcpy(group->past[stage][next], model.y, sizeof model.y);
     }
     group->latest = next;
     if (group->count < 95) ++group->count;
     group->slow = most > 1 ? group->slow + 1 : 0;
-    if (group->slow > group->patience && group->count == 95 && remaining >= 600)
+    if (group->slow > group->patience && group->count == 95 && remaining >= 400)
         harmonic_oscillator_group_fit(group);
-    for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane) {
-        for (int i = 0; i < 2; ++i)
-            if (!isfinite(group->x[i][lane])) group->active[lane] = 0;
-        for (int i = 0; i < 2 && !group->active[lane]; ++i) {
-            group->x[i][lane] = x[i][lane];
-            group->carry[i][lane] = carry[i][lane];
-        }
-        group->left[lane] -= group->active[lane] != 0;
-        active += group->active[lane] != 0;
-    }
-    return active;
+    return harmonic_oscillator_group_leave(group, x, carry, remaining);
 }
 
 /* Put a member into a lane: its state, and its coefficients. */
@@ -1103,14 +1162,15 @@ static harmonic_oscillator_status harmonic_oscillator_group_run(const harmonic_o
     harmonic_oscillator_status worst = harmonic_oscillator_OK, member[8];
     const int count = members - first < harmonic_oscillator_LANES ? (int)(members - first) : harmonic_oscillator_LANES;
     double state[2];
+    size_t left = steps;
     memset(&group, 0, sizeof group);
     for (int lane = 0; lane < count; ++lane) {
         for (size_t i = 0; i < 2; ++i) state[i] = x[i * members + first + (size_t)lane];
-        group.left[lane] = steps;
         member[lane] = harmonic_oscillator_group_join(&group, lane, params, state, h);
     }
-    for (size_t k = 0; k < steps && harmonic_oscillator_group_step(&group, steps - k) > 2; ++k) continue;
+    for (int active = count; left > 0 && active > 2; --left) active = harmonic_oscillator_group_step(&group, left);
     for (int lane = 0; lane < count; ++lane) {
+        if (group.active[lane]) group.left[lane] = left;
         for (int i = 0; i < 2; ++i) state[i] = group.x[i][lane];
         if (member[lane] == harmonic_oscillator_OK) {
             if (group.left[lane] > 0) member[lane] = harmonic_oscillator_group_finish(&group, lane, params, state, h);

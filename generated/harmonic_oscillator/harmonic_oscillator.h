@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: b2883541553b9cd0bb8db033ea5327cfd9c8620925f778db7a1eaabb895cb049
+ * body-sha256: ecb1f89b4c082a7d67dd417bb03382f099c0cff8dd00124fb82972bff0976d45
  */
 #ifndef HARMONIC_OSCILLATOR_H
 #define HARMONIC_OSCILLATOR_H
@@ -51,7 +51,7 @@ typedef enum {
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
-    int terms;    /* how many of them the recurrence uses */
+    int terms;    /* how many of them the recurrence uses; 0 if there is none */
     int fits;     /* how often weight has been fitted */
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */

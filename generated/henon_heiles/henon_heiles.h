@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 1f4d47338a4c8a9f86502a26c5cd3377e091a47dee90cb6ba5484b40b546ac72
+ * body-sha256: bbec691a2eb20319f2be5a353c151aee24dd721f6d2f5a99245fc4138b9e9e40
  */
 #ifndef HENON_HEILES_H
 #define HENON_HEILES_H
@@ -50,7 +50,7 @@ typedef enum {
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
-    int terms;    /* how many of them the recurrence uses */
+    int terms;    /* how many of them the recurrence uses; 0 if there is none */
     int fits;     /* how often weight has been fitted */
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */

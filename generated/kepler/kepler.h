@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 0f40c460122196b915403a55eeee27e180e66bccd396e5a1fd696f8a3e282475
+ * body-sha256: ade19c0333820229dd82f44a6ecda9f128b9422f7975371dd1a01c59111f6bd8
  */
 #ifndef KEPLER_H
 #define KEPLER_H
@@ -50,7 +50,7 @@ typedef enum {
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
-    int terms;    /* how many of them the recurrence uses */
+    int terms;    /* how many of them the recurrence uses; 0 if there is none */
     int fits;     /* how often weight has been fitted */
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 0cbc30e06cf163417d7dba25894ef56c820689e97548dd13053cc5af958fafb5
+ * body-sha256: c9560dbeaca1f0c1b5173c9863d22c9642ba09ca9951277fbada17e17ecb87e0
  */
 #ifndef KOWALEVSKI_TOP_H
 #define KOWALEVSKI_TOP_H
@@ -50,7 +50,7 @@ typedef enum {
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
-    int terms;    /* how many of them the recurrence uses */
+    int terms;    /* how many of them the recurrence uses; 0 if there is none */
     int fits;     /* how often weight has been fitted */
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 498bdc97224713830668b96257b7a8a5412394285a34a1230d432f8f8493aacb
+ * body-sha256: 6b501acafdc5118abce6ceba30053c8a094a15cf935302340aeda433f7992368
  */
 #ifndef LAGRANGE_TOP_H
 #define LAGRANGE_TOP_H
@@ -52,7 +52,7 @@ typedef enum {
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
-    int terms;    /* how many of them the recurrence uses */
+    int terms;    /* how many of them the recurrence uses; 0 if there is none */
     int fits;     /* how often weight has been fitted */
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */

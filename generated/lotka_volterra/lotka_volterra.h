@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 33e58e095a235ea2b568ed685e1aaeefe3117cdf8e23b0155911d40bc0a12c2e
+ * body-sha256: 71b90fb5764068e81ac2992951e640d888422004d92da9bd6b2669d7ce90f23c
  */
 #ifndef LOTKA_VOLTERRA_H
 #define LOTKA_VOLTERRA_H
@@ -50,7 +50,7 @@ typedef enum {
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
-    int terms;    /* how many of them the recurrence uses */
+    int terms;    /* how many of them the recurrence uses; 0 if there is none */
     int fits;     /* how often weight has been fitted */
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */

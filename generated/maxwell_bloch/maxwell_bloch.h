@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 24e8b0bc56a864c59537aab6ecdb14323f5e411f82320f19a016988ff1865513
+ * body-sha256: faadd97e6f8e1ae13f85aa821e549310046f474049bde0e171e9819fc276bd61
  */
 #ifndef MAXWELL_BLOCH_H
 #define MAXWELL_BLOCH_H
@@ -50,7 +50,7 @@ typedef enum {
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
-    int terms;    /* how many of them the recurrence uses */
+    int terms;    /* how many of them the recurrence uses; 0 if there is none */
     int fits;     /* how often weight has been fitted */
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: cb499a0bc5818b508ee0d4b51e0bd2d1fbc961c61c07f49795c36330d07e06f9
+ * body-sha256: 23f7886dec6b221ee9a13ed4479356fae09d00a1d619cd537fcb6d87d9aab7f5
  */
 #include "nambu_pendulum.h"
 
@@ -175,12 +175,12 @@ static void nambu_pendulum_judge(nambu_pendulum_memory *memory, const double val
             memory->order = order;
         }
     }
-    memory->fitting = memory->fits > 0;
+    memory->fitting = memory->terms > 0;
     if (memory->fitting && nambu_pendulum_predict(memory, guess)) {
         fitted = 0.0;
         for (int i = 0; i < 3; ++i) fitted += fabs(value[i] - guess[i]);
     }
-    memory->fitting = memory->fits > 0 && fitted <= least;
+    memory->fitting = memory->terms > 0 && fitted <= least;
     if (memory->order == 0) memory->order = 1;
 }
 
@@ -206,12 +206,27 @@ static void nambu_pendulum_project(int rows, double (*one)[8], int column, doubl
     }
 }
 
+/* By how much recurrences miss the last of these values. */
+static double nambu_pendulum_missed(const double *value, double (*weight)[8])
+{
+    enum { AHEAD = 8, WINDOW = 32, CHECKS = 8 };
+    double most = 0.0;
+    for (int i = 0; i < CHECKS; ++i) {
+        double guess[8] = { 0.0 };
+        for (int k = 0; k < WINDOW; ++k)
+            for (int l = 0; l < 8; ++l) guess[l] += weight[k][l] * value[i + WINDOW - 1 - k];
+        for (int l = 0; l < AHEAD; ++l) most = fmax(most, fabs(guess[l] - value[i + WINDOW + l]));
+    }
+    return most;
+}
+
 /* Fit the recurrences value[m + l] = sum of weight[k][..][l] * value[m - 1 - k], l = 0 ... 8 - 1, to the history of
    a component: ridge least squares by modified Gram-Schmidt, the ridge at the level of rounding. Columns are taken in by
-   eights, until they leave next to nothing of the right-hand sides. How many past values are used. */
+   eights, until they leave next to nothing of the right-hand sides. How many past values are used; 0 if the recurrences do
+   not foresee the last values, which they were not fitted to. */
 static int nambu_pendulum_train(nambu_pendulum_memory *memory, int component)
 {
-    enum { AHEAD = 8, WINDOW = 32, ROWS = 56 };
+    enum { AHEAD = 8, WINDOW = 32, ROWS = 48 };
     double q[WINDOW / 8][ROWS + WINDOW][8], r[WINDOW / 8][WINDOW][8], inverse[WINDOW]; /* eight columns in each part */
     double right[ROWS + WINDOW][8], weight[WINDOW][8], value[95], largest = 0.0, left = HUGE_VAL;
     int terms = 0;
@@ -244,7 +259,7 @@ static int nambu_pendulum_train(nambu_pendulum_memory *memory, int component)
         for (int j = k + 1; j < terms; ++j)
             for (int l = 0; l < 8; ++l) weight[k][l] -= r[j / 8][k][j % 8] * weight[j][l];
     for (int k = 0; k < WINDOW; ++k) memcpy(memory->weight[k][component], weight[k], AHEAD * sizeof(double));
-    return terms;
+    return nambu_pendulum_missed(value + ROWS, weight) <= 1e-07 * largest ? terms : 0;
 }
 
 /* Drop what is old, if so many values would not fit into the history. */
@@ -265,12 +280,15 @@ static void nambu_pendulum_record(nambu_pendulum_memory *memory, const double va
 /* Fit the recurrence to the last values; with every time, wait longer before it is done again. */
 static void nambu_pendulum_fit(nambu_pendulum_memory *memory)
 {
+    int found = 1;
     memory->terms = 0;
-    for (int i = 0; i < 3; ++i) {
+    for (int i = 0; i < 3 && found; ++i) {
         const int terms = nambu_pendulum_train(memory, i);
+        found = terms > 0;
         if (terms > memory->terms) memory->terms = terms;
     }
-    memory->fitting = 1;
+    if (!found) memory->terms = 0;
+    memory->fitting = found;
     ++memory->fits;
     memory->slow = 0;
     memory->patience = memory->patience < 10000 ? 2 * memory->patience + 150 : 20000;
@@ -1492,6 +1510,14 @@ static int nambu_pendulum_block(nambu_pendulum_solver *s, nambu_pendulum_table *
     return passes;
 }
 
+/* Recurrences are given up for a while, the longer the more often that happens. */
+static void nambu_pendulum_give_up(nambu_pendulum_solver *s)
+{
+    s->foreseeing = s->setback = s->pause = 0;
+    s->doubt = 2 * s->doubt + 600;
+    s->retry = s->steps + s->doubt;
+}
+
 /* How the next block is guessed: by recurrences, fitted as soon as enough steps are to be made, or
    have been, to repay that. */
 static void nambu_pendulum_choose_guess(nambu_pendulum_solver *s, size_t steps)
@@ -1502,13 +1528,17 @@ static void nambu_pendulum_choose_guess(nambu_pendulum_solver *s, size_t steps)
             return;
         }
     if (s->foreseeing || (steps < 600 && s->steps < 150) || s->steps < s->retry) return;
-    for (int stage = 0; stage < 1; ++stage) nambu_pendulum_fit(&s->memory[stage]);
     s->foreseeing = 1;
+    for (int stage = 0; stage < 1 && s->foreseeing; ++stage) {
+        nambu_pendulum_fit(&s->memory[stage]);
+        s->foreseeing = s->memory[stage].terms > 0;
+    }
     s->pause = nambu_pendulum_LANES;
+    if (!s->foreseeing) nambu_pendulum_give_up(s);
 }
 
 /* Learn from a block: after one that failed single steps are made, the more the more often that happens. Recurrences
-   that fail repeatedly, or need more passes than steps by Runge-Kutta did, are given up for a while. */
+   that fail repeatedly, or need more passes than steps by Runge-Kutta did, are given up. */
 static void nambu_pendulum_learn_from(nambu_pendulum_solver *s, int passes)
 {
     if (passes > 0) {
@@ -1520,9 +1550,7 @@ static void nambu_pendulum_learn_from(nambu_pendulum_solver *s, int passes)
     if (!s->foreseeing) {
         s->passes = passes > 0 ? passes : INT_MAX;
     } else if (passes > s->passes || s->setback > 5 * nambu_pendulum_LANES) {
-        s->foreseeing = s->setback = s->pause = 0;
-        s->doubt = 2 * s->doubt + 600;
-        s->retry = s->steps + s->doubt;
+        nambu_pendulum_give_up(s);
     }
 }
 
@@ -1572,13 +1600,14 @@ typedef struct {
     int slow;       /* how many of the last steps took more than one iteration */
     int patience;   /* how many of those before recurrences are fitted again */
     int active[8];  /* whether the lane has a member that has not failed */
-    size_t left[8]; /* steps that it has still to make */
+    size_t left[8]; /* steps that are still to be made, where one has */
 } nambu_pendulum_group;
 
 /* The past values of a stage, the latest for k = 0. */
 static nambu_pendulum_lanes *nambu_pendulum_group_past(nambu_pendulum_group *group, int stage, int k)
 {
-    return group->past[stage][(group->latest + k) % 95];
+    const int row = group->latest + k;
+    return group->past[stage][row < 95 ? row : row - 95];
 }
 
 /* Guess the values of a stage by the recurrences of the members. */
@@ -1645,7 +1674,7 @@ static void nambu_pendulum_group_judge(nambu_pendulum_group *group, int stage, n
             group->order[stage] = order;
         }
     }
-    if (group->fits == 0) return;
+    if (group->terms[stage] == 0) return;
     nambu_pendulum_group_foresee(group, stage, row[0]);
     nambu_pendulum_group_subtract(row[0], y);
     group->fitting[stage] = nambu_pendulum_group_sum(group, row[0]) <= least;
@@ -1659,20 +1688,41 @@ static void nambu_pendulum_group_fit(nambu_pendulum_group *group)
     const int helped = group->fits == 0 || group->fitting[0];
     memory.count = 95;
     for (int stage = 0; stage < 1; ++stage) {
+        int found = 1;
         group->terms[stage] = 0;
         for (int lane = 0; lane < nambu_pendulum_LANES; ++lane)
-            for (int i = 0; i < 3 && group->active[lane]; ++i) {
+            for (int i = 0; i < 3 && group->active[lane] && found; ++i) {
                 for (int k = 0; k < 95; ++k)
                     memory.past[95 - 1 - k][i] = nambu_pendulum_group_past(group, stage, k)[i][lane];
                 const int terms = nambu_pendulum_train(&memory, i);
+                found = terms > 0;
                 if (terms > group->terms[stage]) group->terms[stage] = terms;
                 for (int k = 0; k < 32; ++k) group->weight[stage][k][i][lane] = memory.weight[k][i][0];
             }
-        group->fitting[stage] = 1;
+        if (!found) group->terms[stage] = 0;
+        group->fitting[stage] = found;
     }
     ++group->fits;
     group->slow = 0;
     group->patience = helped && group->patience < 10000 ? 2 * group->patience + 150 : 100 * 150;
+}
+
+/* Replace guesses that are not near the last values, as nambu_pendulum_near has it, by these; lane by lane. */
+static void nambu_pendulum_stay_near(nambu_pendulum_lanes y[restrict 3], nambu_pendulum_lanes last[restrict 3])
+{
+    nambu_pendulum_lanes distance = { 0.0 }, size = { 0.0 };
+    for (int i = 0; i < 3; ++i) {
+        nambu_pendulum_EACH_LANE
+        for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) {
+            distance[lane] += fabs(y[i][lane] - last[i][lane]);
+            size[lane] += fabs(last[i][lane]);
+        }
+    }
+    for (int i = 0; i < 3; ++i) {
+        nambu_pendulum_EACH_LANE
+        for (int lane = 0; lane < nambu_pendulum_LANES; ++lane)
+            y[i][lane] = distance[lane] <= 4.0 * size[lane] ? y[i][lane] : last[i][lane];
+    }
 }
 
 /* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group.
@@ -1681,8 +1731,11 @@ static int nambu_pendulum_group_open(nambu_pendulum_group *group, const nambu_pe
     double bend, nambu_pendulum_lanes bound)
 {
     int open = 0;
-    for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) {
+    nambu_pendulum_EACH_LANE
+    for (int lane = 0; lane < nambu_pendulum_LANES; ++lane)
         bound[lane] = nambu_pendulum_remaining(size[lane], bend, bound[lane]);
+    if (nambu_pendulum_largest(bound) <= 1e-20) return 0;
+    for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) {
         const int solved = bound[lane] <= 1e-20 || (previous[lane] < 1e-8 && size[lane] < 1e-10);
         if (!isfinite(size[lane])) group->active[lane] = 0;
         open += group->active[lane] && !solved;
@@ -1695,15 +1748,7 @@ static void nambu_pendulum_group_predict(nambu_pendulum_group *group, int stage,
 {
     if (group->fitting[stage]) nambu_pendulum_group_foresee(group, stage, y);
     else nambu_pendulum_group_extrapolate(group, stage, y);
-    for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) {
-        double guess[3], state[3];
-        for (int i = 0; i < 3; ++i) {
-            guess[i] = y[i][lane];
-            state[i] = group->x[i][lane];
-        }
-        const int near = nambu_pendulum_near(guess, state);
-        for (int i = 0; i < 3 && !near; ++i) y[i][lane] = state[i];
-    }
+    nambu_pendulum_stay_near(y, group->x);
 }
 
 /* Newton's method for a stage, until the slowest lane is solved. The number of iterations; where that is the most
@@ -1734,6 +1779,29 @@ static int nambu_pendulum_group_solve(nambu_pendulum_group *group, int stage, na
     return iterations;
 }
 
+/* Members that failed, or whose state is not finite, keep the state before the step, and leave. How many stay. */
+static int nambu_pendulum_group_leave(nambu_pendulum_group *group, nambu_pendulum_lanes x[3], nambu_pendulum_lanes carry[3],
+    size_t remaining)
+{
+    nambu_pendulum_lanes size = { 0.0 };
+    int active = 0;
+    for (int i = 0; i < 3; ++i)
+        for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) size[lane] += fabs(group->x[i][lane]);
+    for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) active += group->active[lane];
+    if (active == nambu_pendulum_LANES && nambu_pendulum_largest(size) < HUGE_VAL) return active;
+    active = 0;
+    for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) {
+        group->active[lane] = group->active[lane] && isfinite(size[lane]);
+        active += group->active[lane];
+        for (int i = 0; i < 3 && !group->active[lane]; ++i) {
+            group->x[i][lane] = x[i][lane];
+            group->carry[i][lane] = carry[i][lane];
+        }
+        if (!group->active[lane] && group->left[lane] == 0) group->left[lane] = remaining;
+    }
+    return active;
+}
+
 /* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
 static void nambu_pendulum_group_advance(nambu_pendulum_lanes x[restrict 3], nambu_pendulum_lanes carry[restrict 3],
     nambu_pendulum_model *model)
@@ -1755,20 +1823,21 @@ static void nambu_pendulum_group_advance(nambu_pendulum_lanes x[restrict 3], nam
     }
 }
 
-/* One step of all members, of as many as remain. One that fails keeps its state, and leaves. How many are left. */
+/* One step of all members, of as many as remain. How many members are left. */
 static int nambu_pendulum_group_step(nambu_pendulum_group *group, size_t remaining)
 {
     nambu_pendulum_lanes x[3], carry[3];
     nambu_pendulum_model model;
-    const int next = (group->latest + 95 - 1) % 95;
-    int active = 0, most = 0;
+    const int next = (group->latest > 0 ? group->latest : 95) - 1;
+    int most = 0;
     memcpy(x, group->x, sizeof x);
     memcpy(carry, group->carry, sizeof carry);
     for (int stage = 0; stage < 1; ++stage) {
         const int iterations = nambu_pendulum_group_solve(group, stage, &model);
         nambu_pendulum_group_advance(group->x, group->carry, &model);
-        if (next % 8 == 0 || group->count < 8) nambu_pendulum_group_judge(group, stage, model.y);
         if (iterations > most) most = iterations;
+        if ((iterations > 1 && next % 8 == 0) || group->count < 8)
+            nambu_pendulum_group_judge(group, stage, model.y);
         memcpy(group->past[stage][next], model.y, sizeof model.y);
     }
     group->latest = next;
@@ -1776,17 +1845,7 @@ static int nambu_pendulum_group_step(nambu_pendulum_group *group, size_t remaini
     group->slow = most > 1 ? group->slow + 1 : 0;
     if (group->slow > group->patience && group->count == 95 && remaining >= 600)
         nambu_pendulum_group_fit(group);
-    for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) {
-        for (int i = 0; i < 3; ++i)
-            if (!isfinite(group->x[i][lane])) group->active[lane] = 0;
-        for (int i = 0; i < 3 && !group->active[lane]; ++i) {
-            group->x[i][lane] = x[i][lane];
-            group->carry[i][lane] = carry[i][lane];
-        }
-        group->left[lane] -= group->active[lane] != 0;
-        active += group->active[lane] != 0;
-    }
-    return active;
+    return nambu_pendulum_group_leave(group, x, carry, remaining);
 }
 
 /* Put a member into a lane: its state, and its coefficients. */
@@ -1825,14 +1884,15 @@ static nambu_pendulum_status nambu_pendulum_group_run(const nambu_pendulum_param
     nambu_pendulum_status worst = nambu_pendulum_OK, member[8];
     const int count = members - first < nambu_pendulum_LANES ? (int)(members - first) : nambu_pendulum_LANES;
     double state[3];
+    size_t left = steps;
     memset(&group, 0, sizeof group);
     for (int lane = 0; lane < count; ++lane) {
         for (size_t i = 0; i < 3; ++i) state[i] = x[i * members + first + (size_t)lane];
-        group.left[lane] = steps;
         member[lane] = nambu_pendulum_group_join(&group, lane, params, state, h);
     }
-    for (size_t k = 0; k < steps && nambu_pendulum_group_step(&group, steps - k) > 2; ++k) continue;
+    for (int active = count; left > 0 && active > 2; --left) active = nambu_pendulum_group_step(&group, left);
     for (int lane = 0; lane < count; ++lane) {
+        if (group.active[lane]) group.left[lane] = left;
         for (int i = 0; i < 3; ++i) state[i] = group.x[i][lane];
         if (member[lane] == nambu_pendulum_OK) {
             if (group.left[lane] > 0) member[lane] = nambu_pendulum_group_finish(&group, lane, params, state, h);

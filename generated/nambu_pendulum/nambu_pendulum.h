@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 3ca5c41b7f4607c2218e29487b438d3af22ad99c98413c875fd152f4a1b3f3e0
+ * body-sha256: 685325ac4368dd9b7cfa02310bd7bd90adf41dbe147788e22ecde2e559598422
  */
 #ifndef NAMBU_PENDULUM_H
 #define NAMBU_PENDULUM_H
@@ -50,7 +50,7 @@ typedef enum {
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
-    int terms;    /* how many of them the recurrence uses */
+    int terms;    /* how many of them the recurrence uses; 0 if there is none */
     int fits;     /* how often weight has been fitted */
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 3c1f4f2cfb0fcb3ce47ade208b823d63118b3c49daf5445603645a075568164a
+ * body-sha256: 88fc5ef2cb9bb60304d82f04b1f58d102a1a3c130bf4fee9c6cba38608063ac3
  */
 #include "pendulum.h"
 
@@ -208,12 +208,12 @@ static void pendulum_judge(pendulum_memory *memory, const double value[2])
             memory->order = order;
         }
     }
-    memory->fitting = memory->fits > 0;
+    memory->fitting = memory->terms > 0;
     if (memory->fitting && pendulum_predict(memory, guess)) {
         fitted = 0.0;
         for (int i = 0; i < 2; ++i) fitted += fabs(value[i] - guess[i]);
     }
-    memory->fitting = memory->fits > 0 && fitted <= least;
+    memory->fitting = memory->terms > 0 && fitted <= least;
     if (memory->order == 0) memory->order = 1;
 }
 
@@ -239,12 +239,27 @@ static void pendulum_project(int rows, double (*one)[8], int column, double *inv
     }
 }
 
+/* By how much recurrences miss the last of these values. */
+static double pendulum_missed(const double *value, double (*weight)[8])
+{
+    enum { AHEAD = 8, WINDOW = 32, CHECKS = 8 };
+    double most = 0.0;
+    for (int i = 0; i < CHECKS; ++i) {
+        double guess[8] = { 0.0 };
+        for (int k = 0; k < WINDOW; ++k)
+            for (int l = 0; l < 8; ++l) guess[l] += weight[k][l] * value[i + WINDOW - 1 - k];
+        for (int l = 0; l < AHEAD; ++l) most = fmax(most, fabs(guess[l] - value[i + WINDOW + l]));
+    }
+    return most;
+}
+
 /* Fit the recurrences value[m + l] = sum of weight[k][..][l] * value[m - 1 - k], l = 0 ... 8 - 1, to the history of
    a component: ridge least squares by modified Gram-Schmidt, the ridge at the level of rounding. Columns are taken in by
-   eights, until they leave next to nothing of the right-hand sides. How many past values are used. */
+   eights, until they leave next to nothing of the right-hand sides. How many past values are used; 0 if the recurrences do
+   not foresee the last values, which they were not fitted to. */
 static int pendulum_train(pendulum_memory *memory, int component)
 {
-    enum { AHEAD = 8, WINDOW = 32, ROWS = 56 };
+    enum { AHEAD = 8, WINDOW = 32, ROWS = 48 };
     double q[WINDOW / 8][ROWS + WINDOW][8], r[WINDOW / 8][WINDOW][8], inverse[WINDOW]; /* eight columns in each part */
     double right[ROWS + WINDOW][8], weight[WINDOW][8], value[95], largest = 0.0, left = HUGE_VAL;
     int terms = 0;
@@ -277,7 +292,7 @@ static int pendulum_train(pendulum_memory *memory, int component)
         for (int j = k + 1; j < terms; ++j)
             for (int l = 0; l < 8; ++l) weight[k][l] -= r[j / 8][k][j % 8] * weight[j][l];
     for (int k = 0; k < WINDOW; ++k) memcpy(memory->weight[k][component], weight[k], AHEAD * sizeof(double));
-    return terms;
+    return pendulum_missed(value + ROWS, weight) <= 1e-07 * largest ? terms : 0;
 }
 
 /* Drop what is old, if so many values would not fit into the history. */
@@ -298,12 +313,15 @@ static void pendulum_record(pendulum_memory *memory, const double value[2])
 /* Fit the recurrence to the last values; with every time, wait longer before it is done again. */
 static void pendulum_fit(pendulum_memory *memory)
 {
+    int found = 1;
     memory->terms = 0;
-    for (int i = 0; i < 2; ++i) {
+    for (int i = 0; i < 2 && found; ++i) {
         const int terms = pendulum_train(memory, i);
+        found = terms > 0;
         if (terms > memory->terms) memory->terms = terms;
     }
-    memory->fitting = 1;
+    if (!found) memory->terms = 0;
+    memory->fitting = found;
     ++memory->fits;
     memory->slow = 0;
     memory->patience = memory->patience < 10000 ? 2 * memory->patience + 150 : 20000;
@@ -862,6 +880,14 @@ static int pendulum_block(pendulum_solver *s, pendulum_table *table, int most)
     return passes;
 }
 
+/* Recurrences are given up for a while, the longer the more often that happens. */
+static void pendulum_give_up(pendulum_solver *s)
+{
+    s->foreseeing = s->setback = s->pause = 0;
+    s->doubt = 2 * s->doubt + 600;
+    s->retry = s->steps + s->doubt;
+}
+
 /* How the next block is guessed: by recurrences, fitted as soon as enough steps are to be made, or
    have been, to repay that. */
 static void pendulum_choose_guess(pendulum_solver *s, size_t steps)
@@ -872,13 +898,17 @@ static void pendulum_choose_guess(pendulum_solver *s, size_t steps)
             return;
         }
     if (s->foreseeing || (steps < 600 && s->steps < 150) || s->steps < s->retry) return;
-    for (int stage = 0; stage < 1; ++stage) pendulum_fit(&s->memory[stage]);
     s->foreseeing = 1;
+    for (int stage = 0; stage < 1 && s->foreseeing; ++stage) {
+        pendulum_fit(&s->memory[stage]);
+        s->foreseeing = s->memory[stage].terms > 0;
+    }
     s->pause = pendulum_LANES;
+    if (!s->foreseeing) pendulum_give_up(s);
 }
 
 /* Learn from a block: after one that failed single steps are made, the more the more often that happens. Recurrences
-   that fail repeatedly, or need more passes than steps by Runge-Kutta did, are given up for a while. */
+   that fail repeatedly, or need more passes than steps by Runge-Kutta did, are given up. */
 static void pendulum_learn_from(pendulum_solver *s, int passes)
 {
     if (passes > 0) {
@@ -890,9 +920,7 @@ static void pendulum_learn_from(pendulum_solver *s, int passes)
     if (!s->foreseeing) {
         s->passes = passes > 0 ? passes : INT_MAX;
     } else if (passes > s->passes || s->setback > 5 * pendulum_LANES) {
-        s->foreseeing = s->setback = s->pause = 0;
-        s->doubt = 2 * s->doubt + 600;
-        s->retry = s->steps + s->doubt;
+        pendulum_give_up(s);
     }
 }
 
@@ -942,13 +970,14 @@ typedef struct {
     int slow;       /* how many of the last steps took more than one iteration */
     int patience;   /* how many of those before recurrences are fitted again */
     int active[8];  /* whether the lane has a member that has not failed */
-    size_t left[8]; /* steps that it has still to make */
+    size_t left[8]; /* steps that are still to be made, where one has */
 } pendulum_group;
 
 /* The past values of a stage, the latest for k = 0. */
 static pendulum_lanes *pendulum_group_past(pendulum_group *group, int stage, int k)
 {
-    return group->past[stage][(group->latest + k) % 95];
+    const int row = group->latest + k;
+    return group->past[stage][row < 95 ? row : row - 95];
 }
 
 /* Guess the values of a stage by the recurrences of the members. */
@@ -1015,7 +1044,7 @@ static void pendulum_group_judge(pendulum_group *group, int stage, pendulum_lane
             group->order[stage] = order;
         }
     }
-    if (group->fits == 0) return;
+    if (group->terms[stage] == 0) return;
     pendulum_group_foresee(group, stage, row[0]);
     pendulum_group_subtract(row[0], y);
     group->fitting[stage] = pendulum_group_sum(group, row[0]) <= least;
@@ -1029,20 +1058,41 @@ static void pendulum_group_fit(pendulum_group *group)
     const int helped = group->fits == 0 || group->fitting[0];
     memory.count = 95;
     for (int stage = 0; stage < 1; ++stage) {
+        int found = 1;
         group->terms[stage] = 0;
         for (int lane = 0; lane < pendulum_LANES; ++lane)
-            for (int i = 0; i < 2 && group->active[lane]; ++i) {
+            for (int i = 0; i < 2 && group->active[lane] && found; ++i) {
                 for (int k = 0; k < 95; ++k)
                     memory.past[95 - 1 - k][i] = pendulum_group_past(group, stage, k)[i][lane];
                 const int terms = pendulum_train(&memory, i);
+                found = terms > 0;
                 if (terms > group->terms[stage]) group->terms[stage] = terms;
                 for (int k = 0; k < 32; ++k) group->weight[stage][k][i][lane] = memory.weight[k][i][0];
             }
-        group->fitting[stage] = 1;
+        if (!found) group->terms[stage] = 0;
+        group->fitting[stage] = found;
     }
     ++group->fits;
     group->slow = 0;
     group->patience = helped && group->patience < 10000 ? 2 * group->patience + 150 : 100 * 150;
+}
+
+/* Replace guesses that are not near the last values, as pendulum_near has it, by these; lane by lane. */
+static void pendulum_stay_near(pendulum_lanes y[restrict 2], pendulum_lanes last[restrict 2])
+{
+    pendulum_lanes distance = { 0.0 }, size = { 0.0 };
+    for (int i = 0; i < 2; ++i) {
+        pendulum_EACH_LANE
+        for (int lane = 0; lane < pendulum_LANES; ++lane) {
+            distance[lane] += fabs(y[i][lane] - last[i][lane]);
+            size[lane] += fabs(last[i][lane]);
+        }
+    }
+    for (int i = 0; i < 2; ++i) {
+        pendulum_EACH_LANE
+        for (int lane = 0; lane < pendulum_LANES; ++lane)
+            y[i][lane] = distance[lane] <= 4.0 * size[lane] ? y[i][lane] : last[i][lane];
+    }
 }
 
 /* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group.
@@ -1051,8 +1101,11 @@ static int pendulum_group_open(pendulum_group *group, const pendulum_lanes size,
     double bend, pendulum_lanes bound)
 {
     int open = 0;
-    for (int lane = 0; lane < pendulum_LANES; ++lane) {
+    pendulum_EACH_LANE
+    for (int lane = 0; lane < pendulum_LANES; ++lane)
         bound[lane] = pendulum_remaining(size[lane], bend, bound[lane]);
+    if (pendulum_largest(bound) <= 1e-20) return 0;
+    for (int lane = 0; lane < pendulum_LANES; ++lane) {
         const int solved = bound[lane] <= 1e-20 || (previous[lane] < 1e-8 && size[lane] < 1e-10);
         if (!isfinite(size[lane])) group->active[lane] = 0;
         open += group->active[lane] && !solved;
@@ -1065,15 +1118,7 @@ static void pendulum_group_predict(pendulum_group *group, int stage, pendulum_la
 {
     if (group->fitting[stage]) pendulum_group_foresee(group, stage, y);
     else pendulum_group_extrapolate(group, stage, y);
-    for (int lane = 0; lane < pendulum_LANES; ++lane) {
-        double guess[2], state[2];
-        for (int i = 0; i < 2; ++i) {
-            guess[i] = y[i][lane];
-            state[i] = group->x[i][lane];
-        }
-        const int near = pendulum_near(guess, state);
-        for (int i = 0; i < 2 && !near; ++i) y[i][lane] = state[i];
-    }
+    pendulum_stay_near(y, group->x);
 }
 
 /* Newton's method for a stage, until the slowest lane is solved. The number of iterations; where that is the most
@@ -1104,6 +1149,29 @@ static int pendulum_group_solve(pendulum_group *group, int stage, pendulum_model
     return iterations;
 }
 
+/* Members that failed, or whose state is not finite, keep the state before the step, and leave. How many stay. */
+static int pendulum_group_leave(pendulum_group *group, pendulum_lanes x[2], pendulum_lanes carry[2],
+    size_t remaining)
+{
+    pendulum_lanes size = { 0.0 };
+    int active = 0;
+    for (int i = 0; i < 2; ++i)
+        for (int lane = 0; lane < pendulum_LANES; ++lane) size[lane] += fabs(group->x[i][lane]);
+    for (int lane = 0; lane < pendulum_LANES; ++lane) active += group->active[lane];
+    if (active == pendulum_LANES && pendulum_largest(size) < HUGE_VAL) return active;
+    active = 0;
+    for (int lane = 0; lane < pendulum_LANES; ++lane) {
+        group->active[lane] = group->active[lane] && isfinite(size[lane]);
+        active += group->active[lane];
+        for (int i = 0; i < 2 && !group->active[lane]; ++i) {
+            group->x[i][lane] = x[i][lane];
+            group->carry[i][lane] = carry[i][lane];
+        }
+        if (!group->active[lane] && group->left[lane] == 0) group->left[lane] = remaining;
+    }
+    return active;
+}
+
 /* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
 static void pendulum_group_advance(pendulum_lanes x[restrict 2], pendulum_lanes carry[restrict 2],
     pendulum_model *model)
@@ -1125,38 +1193,29 @@ static void pendulum_group_advance(pendulum_lanes x[restrict 2], pendulum_lanes 
     }
 }
 
-/* One step of all members, of as many as remain. One that fails keeps its state, and leaves. How many are left. */
+/* One step of all members, of as many as remain. How many members are left. */
 static int pendulum_group_step(pendulum_group *group, size_t remaining)
 {
     pendulum_lanes x[2], carry[2];
     pendulum_model model;
-    const int next = (group->latest + 95 - 1) % 95;
-    int active = 0, most = 0;
+    const int next = (group->latest > 0 ? group->latest : 95) - 1;
+    int most = 0;
     memcpy(x, group->x, sizeof x);
     memcpy(carry, group->carry, sizeof carry);
     for (int stage = 0; stage < 1; ++stage) {
         const int iterations = pendulum_group_solve(group, stage, &model);
         pendulum_group_advance(group->x, group->carry, &model);
-        if (next % 8 == 0 || group->count < 8) pendulum_group_judge(group, stage, model.y);
         if (iterations > most) most = iterations;
+        if ((iterations > 1 && next % 8 == 0) || group->count < 8)
+            pendulum_group_judge(group, stage, model.y);
         memcpy(group->past[stage][next], model.y, sizeof model.y);
     }
     group->latest = next;
     if (group->count < 95) ++group->count;
     group->slow = most > 1 ? group->slow + 1 : 0;
-    if (group->slow > group->patience && group->count == 95 && remaining >= 600)
+    if (group->slow > group->patience && group->count == 95 && remaining >= 400)
         pendulum_group_fit(group);
-    for (int lane = 0; lane < pendulum_LANES; ++lane) {
-        for (int i = 0; i < 2; ++i)
-            if (!isfinite(group->x[i][lane])) group->active[lane] = 0;
-        for (int i = 0; i < 2 && !group->active[lane]; ++i) {
-            group->x[i][lane] = x[i][lane];
-            group->carry[i][lane] = carry[i][lane];
-        }
-        group->left[lane] -= group->active[lane] != 0;
-        active += group->active[lane] != 0;
-    }
-    return active;
+    return pendulum_group_leave(group, x, carry, remaining);
 }
 
 /* Put a member into a lane: its state, and its coefficients. */
@@ -1195,14 +1254,15 @@ static pendulum_status pendulum_group_run(const pendulum_params *params, double 
     pendulum_status worst = pendulum_OK, member[8];
     const int count = members - first < pendulum_LANES ? (int)(members - first) : pendulum_LANES;
     double state[2];
+    size_t left = steps;
     memset(&group, 0, sizeof group);
     for (int lane = 0; lane < count; ++lane) {
         for (size_t i = 0; i < 2; ++i) state[i] = x[i * members + first + (size_t)lane];
-        group.left[lane] = steps;
         member[lane] = pendulum_group_join(&group, lane, params, state, h);
     }
-    for (size_t k = 0; k < steps && pendulum_group_step(&group, steps - k) > 2; ++k) continue;
+    for (int active = count; left > 0 && active > 2; --left) active = pendulum_group_step(&group, left);
     for (int lane = 0; lane < count; ++lane) {
+        if (group.active[lane]) group.left[lane] = left;
         for (int i = 0; i < 2; ++i) state[i] = group.x[i][lane];
         if (member[lane] == pendulum_OK) {
             if (group.left[lane] > 0) member[lane] = pendulum_group_finish(&group, lane, params, state, h);

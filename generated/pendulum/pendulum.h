@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: db73f236a32371aca75f2b80796362f8a22dd7c56f3272792d127a0828654452
+ * body-sha256: 1f017a01b2afdd64ebc249c1f402896c15cb226f3359c7fc30e1c023dee96468
  */
 #ifndef PENDULUM_H
 #define PENDULUM_H
@@ -50,7 +50,7 @@ typedef enum {
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
-    int terms;    /* how many of them the recurrence uses */
+    int terms;    /* how many of them the recurrence uses; 0 if there is none */
     int fits;     /* how often weight has been fitted */
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: ce613166d2746d1120264dfeb2d66c3275ef4a9827c577f42d1e06a9628f98b4
+ * body-sha256: 266d5fd2247d7c59e516f39533799b02c4fd835ff0b13281c9b8368ccd6da46c
  */
 #ifndef POISSON_NOT_HAMILTONIAN_H
 #define POISSON_NOT_HAMILTONIAN_H
@@ -50,7 +50,7 @@ typedef enum {
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
-    int terms;    /* how many of them the recurrence uses */
+    int terms;    /* how many of them the recurrence uses; 0 if there is none */
     int fits;     /* how often weight has been fitted */
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */

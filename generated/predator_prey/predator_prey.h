@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 6194b931698c8f4b661ea55fe491198c9d83fcb97f6537306320e18a10af6a16
+ * body-sha256: 85888314ac852dc4a7cf397497f4ae51412001726426e72c5a15939829e10618
  */
 #ifndef PREDATOR_PREY_H
 #define PREDATOR_PREY_H
@@ -53,7 +53,7 @@ typedef enum {
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
-    int terms;    /* how many of them the recurrence uses */
+    int terms;    /* how many of them the recurrence uses; 0 if there is none */
     int fits;     /* how often weight has been fitted */
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */

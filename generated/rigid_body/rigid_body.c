@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: d19f34198ab1e1dfa821f4e614bfd59a5a107d42c01d23b55229f120d93d4ac4
+ * body-sha256: 1367acd05755d45c997bd2a9f7f646eb603337a478903090b559877323ff098d
  */
 #include "rigid_body.h"
 
@@ -476,12 +476,12 @@ static void rigid_body_judge(rigid_body_memory *memory, const double value[3])
             memory->order = order;
         }
     }
-    memory->fitting = memory->fits > 0;
+    memory->fitting = memory->terms > 0;
     if (memory->fitting && rigid_body_predict(memory, guess)) {
         fitted = 0.0;
         for (int i = 0; i < 3; ++i) fitted += fabs(value[i] - guess[i]);
     }
-    memory->fitting = memory->fits > 0 && fitted <= least;
+    memory->fitting = memory->terms > 0 && fitted <= least;
     if (memory->order == 0) memory->order = 1;
 }
 
@@ -507,12 +507,27 @@ static void rigid_body_project(int rows, double (*one)[8], int column, double *i
     }
 }
 
+/* By how much recurrences miss the last of these values. */
+static double rigid_body_missed(const double *value, double (*weight)[8])
+{
+    enum { AHEAD = 8, WINDOW = 32, CHECKS = 8 };
+    double most = 0.0;
+    for (int i = 0; i < CHECKS; ++i) {
+        double guess[8] = { 0.0 };
+        for (int k = 0; k < WINDOW; ++k)
+            for (int l = 0; l < 8; ++l) guess[l] += weight[k][l] * value[i + WINDOW - 1 - k];
+        for (int l = 0; l < AHEAD; ++l) most = fmax(most, fabs(guess[l] - value[i + WINDOW + l]));
+    }
+    return most;
+}
+
 /* Fit the recurrences value[m + l] = sum of weight[k][..][l] * value[m - 1 - k], l = 0 ... 8 - 1, to the history of
    a component: ridge least squares by modified Gram-Schmidt, the ridge at the level of rounding. Columns are taken in by
-   eights, until they leave next to nothing of the right-hand sides. How many past values are used. */
+   eights, until they leave next to nothing of the right-hand sides. How many past values are used; 0 if the recurrences do
+   not foresee the last values, which they were not fitted to. */
 static int rigid_body_train(rigid_body_memory *memory, int component)
 {
-    enum { AHEAD = 8, WINDOW = 32, ROWS = 56 };
+    enum { AHEAD = 8, WINDOW = 32, ROWS = 48 };
     double q[WINDOW / 8][ROWS + WINDOW][8], r[WINDOW / 8][WINDOW][8], inverse[WINDOW]; /* eight columns in each part */
     double right[ROWS + WINDOW][8], weight[WINDOW][8], value[95], largest = 0.0, left = HUGE_VAL;
     int terms = 0;
@@ -545,7 +560,7 @@ static int rigid_body_train(rigid_body_memory *memory, int component)
         for (int j = k + 1; j < terms; ++j)
             for (int l = 0; l < 8; ++l) weight[k][l] -= r[j / 8][k][j % 8] * weight[j][l];
     for (int k = 0; k < WINDOW; ++k) memcpy(memory->weight[k][component], weight[k], AHEAD * sizeof(double));
-    return terms;
+    return rigid_body_missed(value + ROWS, weight) <= 1e-07 * largest ? terms : 0;
 }
 
 /* Drop what is old, if so many values would not fit into the history. */
@@ -566,12 +581,15 @@ static void rigid_body_record(rigid_body_memory *memory, const double value[3])
 /* Fit the recurrence to the last values; with every time, wait longer before it is done again. */
 static void rigid_body_fit(rigid_body_memory *memory)
 {
+    int found = 1;
     memory->terms = 0;
-    for (int i = 0; i < 3; ++i) {
+    for (int i = 0; i < 3 && found; ++i) {
         const int terms = rigid_body_train(memory, i);
+        found = terms > 0;
         if (terms > memory->terms) memory->terms = terms;
     }
-    memory->fitting = 1;
+    if (!found) memory->terms = 0;
+    memory->fitting = found;
     ++memory->fits;
     memory->slow = 0;
     memory->patience = memory->patience < 10000 ? 2 * memory->patience + 150 : 20000;
@@ -1394,6 +1412,14 @@ static int rigid_body_block(rigid_body_solver *s, rigid_body_table *table, int m
     return passes;
 }
 
+/* Recurrences are given up for a while, the longer the more often that happens. */
+static void rigid_body_give_up(rigid_body_solver *s)
+{
+    s->foreseeing = s->setback = s->pause = 0;
+    s->doubt = 2 * s->doubt + 600;
+    s->retry = s->steps + s->doubt;
+}
+
 /* How the next block is guessed: by recurrences, fitted as soon as enough steps are to be made, or
    have been, to repay that. */
 static void rigid_body_choose_guess(rigid_body_solver *s, size_t steps)
@@ -1404,13 +1430,17 @@ static void rigid_body_choose_guess(rigid_body_solver *s, size_t steps)
             return;
         }
     if (s->foreseeing || (steps < 600 && s->steps < 150) || s->steps < s->retry) return;
-    for (int stage = 0; stage < 1; ++stage) rigid_body_fit(&s->memory[stage]);
     s->foreseeing = 1;
+    for (int stage = 0; stage < 1 && s->foreseeing; ++stage) {
+        rigid_body_fit(&s->memory[stage]);
+        s->foreseeing = s->memory[stage].terms > 0;
+    }
     s->pause = rigid_body_LANES;
+    if (!s->foreseeing) rigid_body_give_up(s);
 }
 
 /* Learn from a block: after one that failed single steps are made, the more the more often that happens. Recurrences
-   that fail repeatedly, or need more passes than steps by Runge-Kutta did, are given up for a while. */
+   that fail repeatedly, or need more passes than steps by Runge-Kutta did, are given up. */
 static void rigid_body_learn_from(rigid_body_solver *s, int passes)
 {
     if (passes > 0) {
@@ -1422,9 +1452,7 @@ static void rigid_body_learn_from(rigid_body_solver *s, int passes)
     if (!s->foreseeing) {
         s->passes = passes > 0 ? passes : INT_MAX;
     } else if (passes > s->passes || s->setback > 5 * rigid_body_LANES) {
-        s->foreseeing = s->setback = s->pause = 0;
-        s->doubt = 2 * s->doubt + 600;
-        s->retry = s->steps + s->doubt;
+        rigid_body_give_up(s);
     }
 }
 
@@ -1474,14 +1502,15 @@ typedef struct {
     int slow;       /* how many of the last steps took more than one iteration */
     int patience;   /* how many of those before recurrences are fitted again */
     int active[8];  /* whether the lane has a member that has not failed */
-    size_t left[8]; /* steps that it has still to make */
+    size_t left[8]; /* steps that are still to be made, where one has */
     double gauge[8][1]; /* of each member */
 } rigid_body_group;
 
 /* The past values of a stage, the latest for k = 0. */
 static rigid_body_lanes *rigid_body_group_past(rigid_body_group *group, int stage, int k)
 {
-    return group->past[stage][(group->latest + k) % 95];
+    const int row = group->latest + k;
+    return group->past[stage][row < 95 ? row : row - 95];
 }
 
 /* Guess the values of a stage by the recurrences of the members. */
@@ -1548,7 +1577,7 @@ static void rigid_body_group_judge(rigid_body_group *group, int stage, rigid_bod
             group->order[stage] = order;
         }
     }
-    if (group->fits == 0) return;
+    if (group->terms[stage] == 0) return;
     rigid_body_group_foresee(group, stage, row[0]);
     rigid_body_group_subtract(row[0], y);
     group->fitting[stage] = rigid_body_group_sum(group, row[0]) <= least;
@@ -1562,20 +1591,41 @@ static void rigid_body_group_fit(rigid_body_group *group)
     const int helped = group->fits == 0 || group->fitting[0];
     memory.count = 95;
     for (int stage = 0; stage < 1; ++stage) {
+        int found = 1;
         group->terms[stage] = 0;
         for (int lane = 0; lane < rigid_body_LANES; ++lane)
-            for (int i = 0; i < 3 && group->active[lane]; ++i) {
+            for (int i = 0; i < 3 && group->active[lane] && found; ++i) {
                 for (int k = 0; k < 95; ++k)
                     memory.past[95 - 1 - k][i] = rigid_body_group_past(group, stage, k)[i][lane];
                 const int terms = rigid_body_train(&memory, i);
+                found = terms > 0;
                 if (terms > group->terms[stage]) group->terms[stage] = terms;
                 for (int k = 0; k < 32; ++k) group->weight[stage][k][i][lane] = memory.weight[k][i][0];
             }
-        group->fitting[stage] = 1;
+        if (!found) group->terms[stage] = 0;
+        group->fitting[stage] = found;
     }
     ++group->fits;
     group->slow = 0;
     group->patience = helped && group->patience < 10000 ? 2 * group->patience + 150 : 100 * 150;
+}
+
+/* Replace guesses that are not near the last values, as rigid_body_near has it, by these; lane by lane. */
+static void rigid_body_stay_near(rigid_body_lanes y[restrict 3], rigid_body_lanes last[restrict 3])
+{
+    rigid_body_lanes distance = { 0.0 }, size = { 0.0 };
+    for (int i = 0; i < 3; ++i) {
+        rigid_body_EACH_LANE
+        for (int lane = 0; lane < rigid_body_LANES; ++lane) {
+            distance[lane] += fabs(y[i][lane] - last[i][lane]);
+            size[lane] += fabs(last[i][lane]);
+        }
+    }
+    for (int i = 0; i < 3; ++i) {
+        rigid_body_EACH_LANE
+        for (int lane = 0; lane < rigid_body_LANES; ++lane)
+            y[i][lane] = distance[lane] <= 4.0 * size[lane] ? y[i][lane] : last[i][lane];
+    }
 }
 
 /* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group.
@@ -1584,8 +1634,11 @@ static int rigid_body_group_open(rigid_body_group *group, const rigid_body_lanes
     double bend, rigid_body_lanes bound)
 {
     int open = 0;
-    for (int lane = 0; lane < rigid_body_LANES; ++lane) {
+    rigid_body_EACH_LANE
+    for (int lane = 0; lane < rigid_body_LANES; ++lane)
         bound[lane] = rigid_body_remaining(size[lane], bend, bound[lane]);
+    if (rigid_body_largest(bound) <= 1e-20) return 0;
+    for (int lane = 0; lane < rigid_body_LANES; ++lane) {
         const int solved = bound[lane] <= 1e-20 || (previous[lane] < 1e-8 && size[lane] < 1e-10);
         if (!isfinite(size[lane])) group->active[lane] = 0;
         open += group->active[lane] && !solved;
@@ -1598,15 +1651,7 @@ static void rigid_body_group_predict(rigid_body_group *group, int stage, rigid_b
 {
     if (group->fitting[stage]) rigid_body_group_foresee(group, stage, y);
     else rigid_body_group_extrapolate(group, stage, y);
-    for (int lane = 0; lane < rigid_body_LANES; ++lane) {
-        double guess[3], state[3];
-        for (int i = 0; i < 3; ++i) {
-            guess[i] = y[i][lane];
-            state[i] = group->x[i][lane];
-        }
-        const int near = rigid_body_near(guess, state);
-        for (int i = 0; i < 3 && !near; ++i) y[i][lane] = state[i];
-    }
+    rigid_body_stay_near(y, group->x);
 }
 
 /* Newton's method for a stage, until the slowest lane is solved. The number of iterations; where that is the most
@@ -1637,6 +1682,29 @@ static int rigid_body_group_solve(rigid_body_group *group, int stage, rigid_body
     return iterations;
 }
 
+/* Members that failed, or whose state is not finite, keep the state before the step, and leave. How many stay. */
+static int rigid_body_group_leave(rigid_body_group *group, rigid_body_lanes x[3], rigid_body_lanes carry[3],
+    size_t remaining)
+{
+    rigid_body_lanes size = { 0.0 };
+    int active = 0;
+    for (int i = 0; i < 3; ++i)
+        for (int lane = 0; lane < rigid_body_LANES; ++lane) size[lane] += fabs(group->x[i][lane]);
+    for (int lane = 0; lane < rigid_body_LANES; ++lane) active += group->active[lane];
+    if (active == rigid_body_LANES && rigid_body_largest(size) < HUGE_VAL) return active;
+    active = 0;
+    for (int lane = 0; lane < rigid_body_LANES; ++lane) {
+        group->active[lane] = group->active[lane] && isfinite(size[lane]);
+        active += group->active[lane];
+        for (int i = 0; i < 3 && !group->active[lane]; ++i) {
+            group->x[i][lane] = x[i][lane];
+            group->carry[i][lane] = carry[i][lane];
+        }
+        if (!group->active[lane] && group->left[lane] == 0) group->left[lane] = remaining;
+    }
+    return active;
+}
+
 /* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
 static void rigid_body_group_advance(rigid_body_lanes x[restrict 3], rigid_body_lanes carry[restrict 3],
     rigid_body_model *model)
@@ -1658,20 +1726,21 @@ static void rigid_body_group_advance(rigid_body_lanes x[restrict 3], rigid_body_
     }
 }
 
-/* One step of all members, of as many as remain. One that fails keeps its state, and leaves. How many are left. */
+/* One step of all members, of as many as remain. How many members are left. */
 static int rigid_body_group_step(rigid_body_group *group, size_t remaining)
 {
     rigid_body_lanes x[3], carry[3];
     rigid_body_model model;
-    const int next = (group->latest + 95 - 1) % 95;
-    int active = 0, most = 0;
+    const int next = (group->latest > 0 ? group->latest : 95) - 1;
+    int most = 0;
     memcpy(x, group->x, sizeof x);
     memcpy(carry, group->carry, sizeof carry);
     for (int stage = 0; stage < 1; ++stage) {
         const int iterations = rigid_body_group_solve(group, stage, &model);
         rigid_body_group_advance(group->x, group->carry, &model);
-        if (next % 8 == 0 || group->count < 8) rigid_body_group_judge(group, stage, model.y);
         if (iterations > most) most = iterations;
+        if ((iterations > 1 && next % 8 == 0) || group->count < 8)
+            rigid_body_group_judge(group, stage, model.y);
         memcpy(group->past[stage][next], model.y, sizeof model.y);
     }
     group->latest = next;
@@ -1679,17 +1748,7 @@ static int rigid_body_group_step(rigid_body_group *group, size_t remaining)
     group->slow = most > 1 ? group->slow + 1 : 0;
     if (group->slow > group->patience && group->count == 95 && remaining >= 600)
         rigid_body_group_fit(group);
-    for (int lane = 0; lane < rigid_body_LANES; ++lane) {
-        for (int i = 0; i < 3; ++i)
-            if (!isfinite(group->x[i][lane])) group->active[lane] = 0;
-        for (int i = 0; i < 3 && !group->active[lane]; ++i) {
-            group->x[i][lane] = x[i][lane];
-            group->carry[i][lane] = carry[i][lane];
-        }
-        group->left[lane] -= group->active[lane] != 0;
-        active += group->active[lane] != 0;
-    }
-    return active;
+    return rigid_body_group_leave(group, x, carry, remaining);
 }
 
 /* Put a member into a lane: its state, and its coefficients. */
@@ -1729,14 +1788,15 @@ static rigid_body_status rigid_body_group_run(const rigid_body_params *params, d
     rigid_body_status worst = rigid_body_OK, member[8];
     const int count = members - first < rigid_body_LANES ? (int)(members - first) : rigid_body_LANES;
     double state[3];
+    size_t left = steps;
     memset(&group, 0, sizeof group);
     for (int lane = 0; lane < count; ++lane) {
         for (size_t i = 0; i < 3; ++i) state[i] = x[i * members + first + (size_t)lane];
-        group.left[lane] = steps;
         member[lane] = rigid_body_group_join(&group, lane, params, state, h);
     }
-    for (size_t k = 0; k < steps && rigid_body_group_step(&group, steps - k) > 2; ++k) continue;
+    for (int active = count; left > 0 && active > 2; --left) active = rigid_body_group_step(&group, left);
     for (int lane = 0; lane < count; ++lane) {
+        if (group.active[lane]) group.left[lane] = left;
         for (int i = 0; i < 3; ++i) state[i] = group.x[i][lane];
         if (member[lane] == rigid_body_OK) {
             if (group.left[lane] > 0) member[lane] = rigid_body_group_finish(&group, lane, params, state, h);

@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: a08a616d68bf69dc1b5985f20878ae8fb77e9167a5bf4b52db96c9d33334fcd5
+ * body-sha256: 3ff3ec49ba62fa613263cdc10fa429b9c0b370dfd25044f7dabe05f6e7b06193
  */
 #ifndef RIGID_BODY_H
 #define RIGID_BODY_H
@@ -53,7 +53,7 @@ typedef enum {
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
-    int terms;    /* how many of them the recurrence uses */
+    int terms;    /* how many of them the recurrence uses; 0 if there is none */
     int fits;     /* how often weight has been fitted */
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */

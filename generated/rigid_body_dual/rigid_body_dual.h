@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 7f5abc0c26cfc302be860a64b3b9e9787ee5ad24149e30619acf848c0ed20dde
+ * body-sha256: 0f487a7e8a78b6996e5a96bb40066b00b3a93e871eeca3f50ca3ede58a43bf47
  */
 #ifndef RIGID_BODY_DUAL_H
 #define RIGID_BODY_DUAL_H
@@ -53,7 +53,7 @@ typedef enum {
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
-    int terms;    /* how many of them the recurrence uses */
+    int terms;    /* how many of them the recurrence uses; 0 if there is none */
     int fits;     /* how often weight has been fitted */
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */

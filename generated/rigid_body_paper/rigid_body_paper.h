@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 7cc1d1ca4f81da29c3d060a1107b9291d9ab3eaecae14f2fea3d882a37c85c9c
+ * body-sha256: bcb51a8dfe0aa177adfa4f6e23ee8a6b5dabcb3dc92d60d933caf7c7728cc7a0
  */
 #ifndef RIGID_BODY_PAPER_H
 #define RIGID_BODY_PAPER_H
@@ -52,7 +52,7 @@ typedef enum {
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
-    int terms;    /* how many of them the recurrence uses */
+    int terms;    /* how many of them the recurrence uses; 0 if there is none */
     int fits;     /* how often weight has been fitted */
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 3a298682a0f4b2d8da6370d0e0b4873e2e9ac581cde0a8bcd3fffa9dcdd8abab
+ * body-sha256: 03718e46a8724379b987348dd08a07513bb6534753157e673dcc4a368311078d
  */
 #ifndef SIR_EPIDEMIC_H
 #define SIR_EPIDEMIC_H
@@ -51,7 +51,7 @@ typedef enum {
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
-    int terms;    /* how many of them the recurrence uses */
+    int terms;    /* how many of them the recurrence uses; 0 if there is none */
     int fits;     /* how often weight has been fitted */
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */

@@ -12,7 +12,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 79f82fd6e75bc313947eddba2020ee646e03ffd2d9272bf7dbac889ef7ed736d
+ * body-sha256: f003c6896caecc99985c6d106bea2aa8211dbddb6a237883d13355aeb3e51ab7
  */
 #ifndef SIR_FINAL_SIZE_H
 #define SIR_FINAL_SIZE_H
@@ -50,7 +50,7 @@ typedef enum {
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
-    int terms;    /* how many of them the recurrence uses */
+    int terms;    /* how many of them the recurrence uses; 0 if there is none */
     int fits;     /* how often weight has been fitted */
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */

@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 808ef6dea919a05a4e37eff076787d501f815bf4d6d642674b0cbae9a923b68b
+ * body-sha256: 538500bcecfbe296b0e4cdf50247e5921bb492fe51a2c110b087cd04872b37a6
  */
 #ifndef SKLYANIN_GYROSTAT_H
 #define SKLYANIN_GYROSTAT_H
@@ -51,7 +51,7 @@ typedef enum {
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
-    int terms;    /* how many of them the recurrence uses */
+    int terms;    /* how many of them the recurrence uses; 0 if there is none */
     int fits;     /* how often weight has been fitted */
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */

@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: e5717452df61344560b0793cb7d7955fc111bf9e2f100bd3c42fad14ef1c3b8f
+ * body-sha256: 501bc11d64fdd2ebd6d96561d15ab3aa427589a9e07ddcda949874941c382c0e
  */
 #ifndef SO4_MANAKOV_H
 #define SO4_MANAKOV_H
@@ -51,7 +51,7 @@ typedef enum {
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
-    int terms;    /* how many of them the recurrence uses */
+    int terms;    /* how many of them the recurrence uses; 0 if there is none */
     int fits;     /* how often weight has been fitted */
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */

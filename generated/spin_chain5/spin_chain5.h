@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: a38cb45a9f543caf343bcd661c60fbf874dc19946a218c1be6ef22d82f0b05bb
+ * body-sha256: aadd63dfbb0c765825803c407f6dac9978e7e3b48b20e43b1ab6d42131d3fa8f
  */
 #ifndef SPIN_CHAIN5_H
 #define SPIN_CHAIN5_H
@@ -51,7 +51,7 @@ typedef enum {
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
-    int terms;    /* how many of them the recurrence uses */
+    int terms;    /* how many of them the recurrence uses; 0 if there is none */
     int fits;     /* how often weight has been fitted */
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 487e1194baad18af298b5ac337aee317f73bd1dfd93bc72065f98f5d6386c588
+ * body-sha256: d7903a6acc308f1d34df45578f4658859c50226402f71d6cac6e9cf0e03db11c
  */
 #include "toda3.h"
 
@@ -393,12 +393,12 @@ static void toda3_judge(toda3_memory *memory, const double value[5])
             memory->order = order;
         }
     }
-    memory->fitting = memory->fits > 0;
+    memory->fitting = memory->terms > 0;
     if (memory->fitting && toda3_predict(memory, guess)) {
         fitted = 0.0;
         for (int i = 0; i < 5; ++i) fitted += fabs(value[i] - guess[i]);
     }
-    memory->fitting = memory->fits > 0 && fitted <= least;
+    memory->fitting = memory->terms > 0 && fitted <= least;
     if (memory->order == 0) memory->order = 1;
 }
 
@@ -424,12 +424,27 @@ static void toda3_project(int rows, double (*one)[8], int column, double *invers
     }
 }
 
+/* By how much recurrences miss the last of these values. */
+static double toda3_missed(const double *value, double (*weight)[8])
+{
+    enum { AHEAD = 8, WINDOW = 32, CHECKS = 8 };
+    double most = 0.0;
+    for (int i = 0; i < CHECKS; ++i) {
+        double guess[8] = { 0.0 };
+        for (int k = 0; k < WINDOW; ++k)
+            for (int l = 0; l < 8; ++l) guess[l] += weight[k][l] * value[i + WINDOW - 1 - k];
+        for (int l = 0; l < AHEAD; ++l) most = fmax(most, fabs(guess[l] - value[i + WINDOW + l]));
+    }
+    return most;
+}
+
 /* Fit the recurrences value[m + l] = sum of weight[k][..][l] * value[m - 1 - k], l = 0 ... 8 - 1, to the history of
    a component: ridge least squares by modified Gram-Schmidt, the ridge at the level of rounding. Columns are taken in by
-   eights, until they leave next to nothing of the right-hand sides. How many past values are used. */
+   eights, until they leave next to nothing of the right-hand sides. How many past values are used; 0 if the recurrences do
+   not foresee the last values, which they were not fitted to. */
 static int toda3_train(toda3_memory *memory, int component)
 {
-    enum { AHEAD = 8, WINDOW = 32, ROWS = 56 };
+    enum { AHEAD = 8, WINDOW = 32, ROWS = 48 };
     double q[WINDOW / 8][ROWS + WINDOW][8], r[WINDOW / 8][WINDOW][8], inverse[WINDOW]; /* eight columns in each part */
     double right[ROWS + WINDOW][8], weight[WINDOW][8], value[95], largest = 0.0, left = HUGE_VAL;
     int terms = 0;
@@ -462,7 +477,7 @@ static int toda3_train(toda3_memory *memory, int component)
         for (int j = k + 1; j < terms; ++j)
             for (int l = 0; l < 8; ++l) weight[k][l] -= r[j / 8][k][j % 8] * weight[j][l];
     for (int k = 0; k < WINDOW; ++k) memcpy(memory->weight[k][component], weight[k], AHEAD * sizeof(double));
-    return terms;
+    return toda3_missed(value + ROWS, weight) <= 1e-07 * largest ? terms : 0;
 }
 
 /* Drop what is old, if so many values would not fit into the history. */
@@ -483,12 +498,15 @@ static void toda3_record(toda3_memory *memory, const double value[5])
 /* Fit the recurrence to the last values; with every time, wait longer before it is done again. */
 static void toda3_fit(toda3_memory *memory)
 {
+    int found = 1;
     memory->terms = 0;
-    for (int i = 0; i < 5; ++i) {
+    for (int i = 0; i < 5 && found; ++i) {
         const int terms = toda3_train(memory, i);
+        found = terms > 0;
         if (terms > memory->terms) memory->terms = terms;
     }
-    memory->fitting = 1;
+    if (!found) memory->terms = 0;
+    memory->fitting = found;
     ++memory->fits;
     memory->slow = 0;
     memory->patience = memory->patience < 10000 ? 2 * memory->patience + 150 : 20000;
@@ -1215,6 +1233,14 @@ static int toda3_block(toda3_solver *s, toda3_table *table, int most)
     return passes;
 }
 
+/* Recurrences are given up for a while, the longer the more often that happens. */
+static void toda3_give_up(toda3_solver *s)
+{
+    s->foreseeing = s->setback = s->pause = 0;
+    s->doubt = 2 * s->doubt + 600;
+    s->retry = s->steps + s->doubt;
+}
+
 /* How the next block is guessed: by recurrences, fitted as soon as enough steps are to be made, or
    have been, to repay that. */
 static void toda3_choose_guess(toda3_solver *s, size_t steps)
@@ -1225,13 +1251,17 @@ static void toda3_choose_guess(toda3_solver *s, size_t steps)
             return;
         }
     if (s->foreseeing || (steps < 600 && s->steps < 150) || s->steps < s->retry) return;
-    for (int stage = 0; stage < 1; ++stage) toda3_fit(&s->memory[stage]);
     s->foreseeing = 1;
+    for (int stage = 0; stage < 1 && s->foreseeing; ++stage) {
+        toda3_fit(&s->memory[stage]);
+        s->foreseeing = s->memory[stage].terms > 0;
+    }
     s->pause = toda3_LANES;
+    if (!s->foreseeing) toda3_give_up(s);
 }
 
 /* Learn from a block: after one that failed single steps are made, the more the more often that happens. Recurrences
-   that fail repeatedly, or need more passes than steps by Runge-Kutta did, are given up for a while. */
+   that fail repeatedly, or need more passes than steps by Runge-Kutta did, are given up. */
 static void toda3_learn_from(toda3_solver *s, int passes)
 {
     if (passes > 0) {
@@ -1243,9 +1273,7 @@ static void toda3_learn_from(toda3_solver *s, int passes)
     if (!s->foreseeing) {
         s->passes = passes > 0 ? passes : INT_MAX;
     } else if (passes > s->passes || s->setback > 5 * toda3_LANES) {
-        s->foreseeing = s->setback = s->pause = 0;
-        s->doubt = 2 * s->doubt + 600;
-        s->retry = s->steps + s->doubt;
+        toda3_give_up(s);
     }
 }
 
@@ -1295,13 +1323,14 @@ typedef struct {
     int slow;       /* how many of the last steps took more than one iteration */
     int patience;   /* how many of those before recurrences are fitted again */
     int active[8];  /* whether the lane has a member that has not failed */
-    size_t left[8]; /* steps that it has still to make */
+    size_t left[8]; /* steps that are still to be made, where one has */
 } toda3_group;
 
 /* The past values of a stage, the latest for k = 0. */
 static toda3_lanes *toda3_group_past(toda3_group *group, int stage, int k)
 {
-    return group->past[stage][(group->latest + k) % 95];
+    const int row = group->latest + k;
+    return group->past[stage][row < 95 ? row : row - 95];
 }
 
 /* Guess the values of a stage by the recurrences of the members. */
@@ -1368,7 +1397,7 @@ static void toda3_group_judge(toda3_group *group, int stage, toda3_lanes y[5])
             group->order[stage] = order;
         }
     }
-    if (group->fits == 0) return;
+    if (group->terms[stage] == 0) return;
     toda3_group_foresee(group, stage, row[0]);
     toda3_group_subtract(row[0], y);
     group->fitting[stage] = toda3_group_sum(group, row[0]) <= least;
@@ -1382,20 +1411,41 @@ static void toda3_group_fit(toda3_group *group)
     const int helped = group->fits == 0 || group->fitting[0];
     memory.count = 95;
     for (int stage = 0; stage < 1; ++stage) {
+        int found = 1;
         group->terms[stage] = 0;
         for (int lane = 0; lane < toda3_LANES; ++lane)
-            for (int i = 0; i < 5 && group->active[lane]; ++i) {
+            for (int i = 0; i < 5 && group->active[lane] && found; ++i) {
                 for (int k = 0; k < 95; ++k)
                     memory.past[95 - 1 - k][i] = toda3_group_past(group, stage, k)[i][lane];
                 const int terms = toda3_train(&memory, i);
+                found = terms > 0;
                 if (terms > group->terms[stage]) group->terms[stage] = terms;
                 for (int k = 0; k < 32; ++k) group->weight[stage][k][i][lane] = memory.weight[k][i][0];
             }
-        group->fitting[stage] = 1;
+        if (!found) group->terms[stage] = 0;
+        group->fitting[stage] = found;
     }
     ++group->fits;
     group->slow = 0;
     group->patience = helped && group->patience < 10000 ? 2 * group->patience + 150 : 100 * 150;
+}
+
+/* Replace guesses that are not near the last values, as toda3_near has it, by these; lane by lane. */
+static void toda3_stay_near(toda3_lanes y[restrict 5], toda3_lanes last[restrict 5])
+{
+    toda3_lanes distance = { 0.0 }, size = { 0.0 };
+    for (int i = 0; i < 5; ++i) {
+        toda3_EACH_LANE
+        for (int lane = 0; lane < toda3_LANES; ++lane) {
+            distance[lane] += fabs(y[i][lane] - last[i][lane]);
+            size[lane] += fabs(last[i][lane]);
+        }
+    }
+    for (int i = 0; i < 5; ++i) {
+        toda3_EACH_LANE
+        for (int lane = 0; lane < toda3_LANES; ++lane)
+            y[i][lane] = distance[lane] <= 4.0 * size[lane] ? y[i][lane] : last[i][lane];
+    }
 }
 
 /* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group.
@@ -1404,8 +1454,11 @@ static int toda3_group_open(toda3_group *group, const toda3_lanes size, const to
     double bend, toda3_lanes bound)
 {
     int open = 0;
-    for (int lane = 0; lane < toda3_LANES; ++lane) {
+    toda3_EACH_LANE
+    for (int lane = 0; lane < toda3_LANES; ++lane)
         bound[lane] = toda3_remaining(size[lane], bend, bound[lane]);
+    if (toda3_largest(bound) <= 1e-20) return 0;
+    for (int lane = 0; lane < toda3_LANES; ++lane) {
         const int solved = bound[lane] <= 1e-20 || (previous[lane] < 1e-8 && size[lane] < 1e-10);
         if (!isfinite(size[lane])) group->active[lane] = 0;
         open += group->active[lane] && !solved;
@@ -1418,15 +1471,7 @@ static void toda3_group_predict(toda3_group *group, int stage, toda3_lanes y[5])
 {
     if (group->fitting[stage]) toda3_group_foresee(group, stage, y);
     else toda3_group_extrapolate(group, stage, y);
-    for (int lane = 0; lane < toda3_LANES; ++lane) {
-        double guess[5], state[5];
-        for (int i = 0; i < 5; ++i) {
-            guess[i] = y[i][lane];
-            state[i] = group->x[i][lane];
-        }
-        const int near = toda3_near(guess, state);
-        for (int i = 0; i < 5 && !near; ++i) y[i][lane] = state[i];
-    }
+    toda3_stay_near(y, group->x);
 }
 
 /* Newton's method for a stage, until the slowest lane is solved. The number of iterations; where that is the most
@@ -1457,6 +1502,29 @@ static int toda3_group_solve(toda3_group *group, int stage, toda3_model *model)
     return iterations;
 }
 
+/* Members that failed, or whose state is not finite, keep the state before the step, and leave. How many stay. */
+static int toda3_group_leave(toda3_group *group, toda3_lanes x[5], toda3_lanes carry[5],
+    size_t remaining)
+{
+    toda3_lanes size = { 0.0 };
+    int active = 0;
+    for (int i = 0; i < 5; ++i)
+        for (int lane = 0; lane < toda3_LANES; ++lane) size[lane] += fabs(group->x[i][lane]);
+    for (int lane = 0; lane < toda3_LANES; ++lane) active += group->active[lane];
+    if (active == toda3_LANES && toda3_largest(size) < HUGE_VAL) return active;
+    active = 0;
+    for (int lane = 0; lane < toda3_LANES; ++lane) {
+        group->active[lane] = group->active[lane] && isfinite(size[lane]);
+        active += group->active[lane];
+        for (int i = 0; i < 5 && !group->active[lane]; ++i) {
+            group->x[i][lane] = x[i][lane];
+            group->carry[i][lane] = carry[i][lane];
+        }
+        if (!group->active[lane] && group->left[lane] == 0) group->left[lane] = remaining;
+    }
+    return active;
+}
+
 /* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
 static void toda3_group_advance(toda3_lanes x[restrict 5], toda3_lanes carry[restrict 5],
     toda3_model *model)
@@ -1478,38 +1546,29 @@ static void toda3_group_advance(toda3_lanes x[restrict 5], toda3_lanes carry[res
     }
 }
 
-/* One step of all members, of as many as remain. One that fails keeps its state, and leaves. How many are left. */
+/* One step of all members, of as many as remain. How many members are left. */
 static int toda3_group_step(toda3_group *group, size_t remaining)
 {
     toda3_lanes x[5], carry[5];
     toda3_model model;
-    const int next = (group->latest + 95 - 1) % 95;
-    int active = 0, most = 0;
+    const int next = (group->latest > 0 ? group->latest : 95) - 1;
+    int most = 0;
     memcpy(x, group->x, sizeof x);
     memcpy(carry, group->carry, sizeof carry);
     for (int stage = 0; stage < 1; ++stage) {
         const int iterations = toda3_group_solve(group, stage, &model);
         toda3_group_advance(group->x, group->carry, &model);
-        if (next % 8 == 0 || group->count < 8) toda3_group_judge(group, stage, model.y);
         if (iterations > most) most = iterations;
+        if ((iterations > 1 && next % 8 == 0) || group->count < 8)
+            toda3_group_judge(group, stage, model.y);
         memcpy(group->past[stage][next], model.y, sizeof model.y);
     }
     group->latest = next;
     if (group->count < 95) ++group->count;
     group->slow = most > 1 ? group->slow + 1 : 0;
-    if (group->slow > group->patience && group->count == 95 && remaining >= 600)
+    if (group->slow > group->patience && group->count == 95 && remaining >= 1000)
         toda3_group_fit(group);
-    for (int lane = 0; lane < toda3_LANES; ++lane) {
-        for (int i = 0; i < 5; ++i)
-            if (!isfinite(group->x[i][lane])) group->active[lane] = 0;
-        for (int i = 0; i < 5 && !group->active[lane]; ++i) {
-            group->x[i][lane] = x[i][lane];
-            group->carry[i][lane] = carry[i][lane];
-        }
-        group->left[lane] -= group->active[lane] != 0;
-        active += group->active[lane] != 0;
-    }
-    return active;
+    return toda3_group_leave(group, x, carry, remaining);
 }
 
 /* Put a member into a lane: its state, and its coefficients. */
@@ -1548,14 +1607,15 @@ static toda3_status toda3_group_run(const toda3_params *params, double *x, size_
     toda3_status worst = toda3_OK, member[8];
     const int count = members - first < toda3_LANES ? (int)(members - first) : toda3_LANES;
     double state[5];
+    size_t left = steps;
     memset(&group, 0, sizeof group);
     for (int lane = 0; lane < count; ++lane) {
         for (size_t i = 0; i < 5; ++i) state[i] = x[i * members + first + (size_t)lane];
-        group.left[lane] = steps;
         member[lane] = toda3_group_join(&group, lane, params, state, h);
     }
-    for (size_t k = 0; k < steps && toda3_group_step(&group, steps - k) > 2; ++k) continue;
+    for (int active = count; left > 0 && active > 2; --left) active = toda3_group_step(&group, left);
     for (int lane = 0; lane < count; ++lane) {
+        if (group.active[lane]) group.left[lane] = left;
         for (int i = 0; i < 5; ++i) state[i] = group.x[i][lane];
         if (member[lane] == toda3_OK) {
             if (group.left[lane] > 0) member[lane] = toda3_group_finish(&group, lane, params, state, h);

@@ -12,7 +12,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 8188b2ccde6a7d5c074c0e20886bc2e7c044e66ab6892ff7b1cee1aea796bd18
+ * body-sha256: 4f3e92241c128b3c2dcfe0a5730d1837dbee30109e68a59da495e3f7980c30e7
  */
 #include "toda3_quadratic.h"
 
@@ -152,12 +152,12 @@ static void toda3_quadratic_judge(toda3_quadratic_memory *memory, const double v
             memory->order = order;
         }
     }
-    memory->fitting = memory->fits > 0;
+    memory->fitting = memory->terms > 0;
     if (memory->fitting && toda3_quadratic_predict(memory, guess)) {
         fitted = 0.0;
         for (int i = 0; i < 5; ++i) fitted += fabs(value[i] - guess[i]);
     }
-    memory->fitting = memory->fits > 0 && fitted <= least;
+    memory->fitting = memory->terms > 0 && fitted <= least;
     if (memory->order == 0) memory->order = 1;
 }
 
@@ -183,12 +183,27 @@ static void toda3_quadratic_project(int rows, double (*one)[8], int column, doub
     }
 }
 
+/* By how much recurrences miss the last of these values. */
+static double toda3_quadratic_missed(const double *value, double (*weight)[8])
+{
+    enum { AHEAD = 1, WINDOW = 32, CHECKS = 8 };
+    double most = 0.0;
+    for (int i = 0; i < CHECKS; ++i) {
+        double guess[8] = { 0.0 };
+        for (int k = 0; k < WINDOW; ++k)
+            for (int l = 0; l < 8; ++l) guess[l] += weight[k][l] * value[i + WINDOW - 1 - k];
+        for (int l = 0; l < AHEAD; ++l) most = fmax(most, fabs(guess[l] - value[i + WINDOW + l]));
+    }
+    return most;
+}
+
 /* Fit the recurrences value[m + l] = sum of weight[k][..][l] * value[m - 1 - k], l = 0 ... 1 - 1, to the history of
    a component: ridge least squares by modified Gram-Schmidt, the ridge at the level of rounding. Columns are taken in by
-   eights, until they leave next to nothing of the right-hand sides. How many past values are used. */
+   eights, until they leave next to nothing of the right-hand sides. How many past values are used; 0 if the recurrences do
+   not foresee the last values, which they were not fitted to. */
 static int toda3_quadratic_train(toda3_quadratic_memory *memory, int component)
 {
-    enum { AHEAD = 1, WINDOW = 32, ROWS = 64 };
+    enum { AHEAD = 1, WINDOW = 32, ROWS = 56 };
     double q[WINDOW / 8][ROWS + WINDOW][8], r[WINDOW / 8][WINDOW][8], inverse[WINDOW]; /* eight columns in each part */
     double right[ROWS + WINDOW][8], weight[WINDOW][8], value[96], largest = 0.0, left = HUGE_VAL;
     int terms = 0;
@@ -221,7 +236,7 @@ static int toda3_quadratic_train(toda3_quadratic_memory *memory, int component)
         for (int j = k + 1; j < terms; ++j)
             for (int l = 0; l < 8; ++l) weight[k][l] -= r[j / 8][k][j % 8] * weight[j][l];
     for (int k = 0; k < WINDOW; ++k) memcpy(memory->weight[k][component], weight[k], AHEAD * sizeof(double));
-    return terms;
+    return toda3_quadratic_missed(value + ROWS, weight) <= 1e-07 * largest ? terms : 0;
 }
 
 /* Drop what is old, if so many values would not fit into the history. */
@@ -242,12 +257,15 @@ static void toda3_quadratic_record(toda3_quadratic_memory *memory, const double 
 /* Fit the recurrence to the last values; with every time, wait longer before it is done again. */
 static void toda3_quadratic_fit(toda3_quadratic_memory *memory)
 {
+    int found = 1;
     memory->terms = 0;
-    for (int i = 0; i < 5; ++i) {
+    for (int i = 0; i < 5 && found; ++i) {
         const int terms = toda3_quadratic_train(memory, i);
+        found = terms > 0;
         if (terms > memory->terms) memory->terms = terms;
     }
-    memory->fitting = 1;
+    if (!found) memory->terms = 0;
+    memory->fitting = found;
     ++memory->fits;
     memory->slow = 0;
     memory->patience = memory->patience < 10000 ? 2 * memory->patience + 150 : 20000;

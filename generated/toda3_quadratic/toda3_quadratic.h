@@ -12,7 +12,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 204fc1b448d84a935b082a990f9bd4f9eecc797a7675b4b106c2f94ee2bd226a
+ * body-sha256: e45bb7b1bba2db9803cac6cd71ebd1a5ac13bdc4b1bbe126dbbc76985ff8ef72
  */
 #ifndef TODA3_QUADRATIC_H
 #define TODA3_QUADRATIC_H
@@ -49,7 +49,7 @@ typedef enum {
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
-    int terms;    /* how many of them the recurrence uses */
+    int terms;    /* how many of them the recurrence uses; 0 if there is none */
     int fits;     /* how often weight has been fitted */
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 9cbdd12779d3a45fb8353e2ea26d1091844a60dfa8d0357e2f194a37790b7613
+ * body-sha256: b8ea3c5aa421330badc5f8b6eec54a7633c746fe73d755f161a9eb3622d1c652
  */
 #ifndef VOLTERRA5_H
 #define VOLTERRA5_H
@@ -50,7 +50,7 @@ typedef enum {
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
-    int terms;    /* how many of them the recurrence uses */
+    int terms;    /* how many of them the recurrence uses; 0 if there is none */
     int fits;     /* how often weight has been fitted */
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 6e7668782961d928bc53cd33e106f53dcf6afa8b6c1149622997151b60dc053d
+ * body-sha256: a2267ccd5c6204358eb948408e0b647d10beb2ee3795e3097d26d619dc36414d
  */
 #ifndef VORTICES3_H
 #define VORTICES3_H
@@ -50,7 +50,7 @@ typedef enum {
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
-    int terms;    /* how many of them the recurrence uses */
+    int terms;    /* how many of them the recurrence uses; 0 if there is none */
     int fits;     /* how often weight has been fitted */
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */

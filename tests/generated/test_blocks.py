@@ -10,12 +10,14 @@ from support import COMMAND, NAMES, compile_text, compiled, run, setting, solver
 from phigen.compiler import compile_spec, emit
 from phigen.targets.c import lanes
 
-#: Where 300 steps multiply round-off. Elsewhere blocks and single steps agree to one unit of the last place for each
-#: stage.
+#: Where 300 steps multiply round-off. Elsewhere blocks and single steps agree to two units of the last place for each
+#: stage: with uncompensated sums they would be ten apart.
 GROWING = {"gaussian_moments": 20, "henon_heiles": 20, "kowalevski_top": 20, "pendulum": 20}
-GROWING |= {"harmonic_oscillator": 2}  # from step 150 on its points are foreseen, and round otherwise: a random walk
 GROWING |= {"nambu_pendulum": 20}
 GROWING |= {"poisson_not_hamiltonian": 500}  # a start changed by one unit ends 220 units apart
+
+#: Chaotic motions, which recurrences do not foresee well enough, so that they are not used.
+UNFORESEEN = {"henon_heiles", "kowalevski_top"}
 
 EXERCISE = Path(__file__).with_name("blocks.c")
 
@@ -58,8 +60,9 @@ def exercise(compilation, optimisation, folder):
     write(folder, code)
     at = setting(compilation)
     definitions = [f"-DNAME={name}", f'-DSOURCE="{name}.c"', f"-DSTEP={at.h!r}"]
-    definitions.append(f"-DULPS={GROWING.get(name, len(compilation.program.fractions))}")
+    definitions.append(f"-DULPS={GROWING.get(name, 2 * len(compilation.program.fractions))}")
     definitions.append(f"-DGROUPS={int(f'{name}_group;' in code[f'{name}.c'])}")
+    definitions.append(f"-DFORESEEN={int(name not in UNFORESEEN)}")
     definitions.append("-DSTATE=" + ", ".join(map(repr, at.x)))
     flags = ["-std=c99", optimisation, "-Wall", "-Wextra", "-Werror", "-Wno-unused-function"]
     run([tool("gcc"), *flags, *definitions, "-I.", EXERCISE, "-o", "blocks", "-lm"], folder)

@@ -23,8 +23,15 @@ WINDOW, FITTED, SMALLEST = 32, 96, 32
 #: The recurrence uses no more values than leave so little, in sizes of the largest.
 ENOUGH = 1e-12
 
+#: Values that a recurrence is not fitted to, but has to foresee, and how far it may be off, in sizes of the largest:
+#: beyond, the motion is chaotic or the step long, and other guesses are as good.
+CHECKS, HOPELESS = 8, 1e-7
+
 #: Steps that a fit costs, about; with the recurrences for whole blocks, four times as many are saved in.
 REPAY = 150
+
+#: Steps that a fit for a member of a group costs, for each coordinate: of eight steps at once, only one is foreseen.
+GROUP_REPAY = 200
 
 #: How far from the last value a guess may be, in sizes of that value.
 REACH = 4.0
@@ -105,17 +112,21 @@ def _memory_values(program: Program) -> dict[str, Any]:
     values = max(SMALLEST, min(FITTED, affordable))
     window = 8 * (values * WINDOW // FITTED // 8)
     ahead = LANES if lanes.blocks(program) else 1
-    rows = 2 * ((values - window - ahead + 1) // 2)
-    fitted = rows + window + ahead - 1
+    checks = min(CHECKS, window // 4)
+    rows = 2 * ((values - window - ahead - checks + 1) // 2)
+    fitted = rows + checks + window + ahead - 1
     return {
         "fitted": fitted,
         "kept": 2 * fitted,
         "repay": REPAY,
         "reach": repr(REACH),
         "most_repay": 4 * REPAY,
+        "group_repay": GROUP_REPAY * program.dimension,
         "window": window,
         "rows": rows,
+        "checks": checks,
         "enough": repr(ENOUGH),
+        "hopeless": repr(HOPELESS),
         "ahead": ahead,
         "horizon": "the next values" if ahead > 1 else "the next value",
     }

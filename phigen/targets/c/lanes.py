@@ -31,7 +31,8 @@ INLINE = {"abs", "sqrt", "sign", "inv"}
 #: Templates in the order in which they call one another.
 _MODELS = ("sizes", "correct", "near_lanes", "solved")
 _BLOCKS = ("chain", "block", "march", "block_step", "choose_guess", "integrate_blocks")
-_GROUPS = ("group", "group_guess", "group_fit", "group_solve", "group_step", "group_run", "ensemble")
+_GUESSES = ("group", "group_guess", "group_fit", "stay_near")
+_GROUPS = (*_GUESSES, "group_solve", "group_leave", "group_step", "group_run", "ensemble")
 
 _MEMBERS = [
     "double effort;  /* evaluations that a single step takes, for each stage */",
