@@ -28,7 +28,7 @@ def packed(program: Program) -> bool:
     """Whether the members of an ensemble are put into packs: where steps are explicit, all members have the same
     coefficients, every function has a version for lanes, and the spec does not say no."""
     explicit = program.driver in ("explicit", "splitting") and not program.gauge
-    states = 2 * PACKS * LANES * 2 * program.dimension
+    states = 2 * PACKS * LANES * 3 * program.dimension
     return explicit and program.lanes and not _calls(program) and 8 * states <= MOST_STACK
 
 
@@ -69,7 +69,9 @@ def values(program: Program) -> Mapping[str, object]:
         "}",
     ]
     far = _two_ways(program)
+    start = f"{name}_lanes start[{program.dimension}]; /* x where a step began; in it, carry is moved */"
     return {
+        "pack_members": [start] if program.driver == "splitting" else [],
         "packs": PACKS,
         "stretch": STRETCH,
         "group_size": "GROUP",

@@ -37,7 +37,7 @@ def in_lanes(program: Program, values: Mapping[str, object], form: str, function
         found.append(function(program, kernel, lanes=True, shared=["coef"], functions=functions) + "\n")
         own = {"k": k, "form": end, "moved": list(enumerate(moved)), "count": max(1, len(moved))}
         found.append(render("c", "flow_lanes.c", {**values, **own}))
-    step = _step(program, schedule_of(program), end, "pack, start, packs")
+    step = _step(program, schedule_of(program), end, "pack, packs")
     return [*found, render("c", "splitting_lanes.c", {**values, "form": end, "step": step})]
 
 
