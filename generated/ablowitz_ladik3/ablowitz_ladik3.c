@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 36a40b927c8cb656fc6588719dba3c900aa7257554ba92d290d55dc2a0877f25
+ * body-sha256: c31fdcca4d9cfca903ef76071fa383dd424532769e2e2c06cb03eeffc3e5a577
  */
 #include "ablowitz_ladik3.h"
 
@@ -557,7 +557,7 @@ static ablowitz_ladik3_status ablowitz_ladik3_attempt(ablowitz_ladik3_solver *s,
             ablowitz_ladik3_remember(memory, y, iteration);
             return ablowitz_ladik3_OK;
         }
-        if (iteration >= 3 && size > 0.2 * previous && !ablowitz_ladik3_differences(s, coef, p, residual, jacobian))
+        if (iteration >= 3 && size > 0.05 * previous && !ablowitz_ladik3_differences(s, coef, p, residual, jacobian))
             return ablowitz_ladik3_NO_CONVERGENCE;
         if (!ablowitz_ladik3_solve(jacobian, residual)) return ablowitz_ladik3_SINGULAR;
         for (int i = 0; i < 6; ++i) p[i] -= residual[i];

@@ -13,7 +13,7 @@
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: ce9efb1e9c9ea7f0adaa6b075390453cd3cb9d4b7c3d2e2400ab5d00fc41f1f9
+# body-sha256: 49c7c30885e65f93d1d74d3dc5882b3021c6a84ab9778d901ee523c0bc85ef6e
 import numpy as np
 
 VERSION = "0.1.0"
@@ -364,7 +364,7 @@ def _attempt(coef, x, carry, p):
         status[open_[done & ~good]] = "NOT_FINITE"
         status[open_[good]] = ""
         x[open_[good]], carry[open_[good]] = total[good], rest[good]
-        slow = np.flatnonzero(finite & ~done & (iteration >= 3) & (size > 0.2 * previous[open_]))
+        slow = np.flatnonzero(finite & ~done & (iteration >= 3) & (size > 0.05 * previous[open_]))
         if len(slow):
             at = open_[slow]
             jacobian[slow] = _differences(_at(coef, at), x[at], p[at], residual[slow])

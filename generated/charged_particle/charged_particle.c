@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 57717703cc05221b3fce2bf1c9ebb64c385ddb78564fec8c8cf6f07e573e5526
+ * body-sha256: c011910c657fe630e550fd7bfec54fd88b80b5e537cc4cbd1496091ea7918621
  */
 #include "charged_particle.h"
 
@@ -551,7 +551,7 @@ static charged_particle_status charged_particle_attempt(charged_particle_solver 
             charged_particle_remember(memory, y, iteration);
             return charged_particle_OK;
         }
-        if (iteration >= 3 && size > 0.2 * previous && !charged_particle_differences(s, coef, p, residual, jacobian))
+        if (iteration >= 3 && size > 0.05 * previous && !charged_particle_differences(s, coef, p, residual, jacobian))
             return charged_particle_NO_CONVERGENCE;
         if (!charged_particle_solve(jacobian, residual)) return charged_particle_SINGULAR;
         for (int i = 0; i < 6; ++i) p[i] -= residual[i];

@@ -12,7 +12,7 @@
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 452a8582e39e75350b61b69e94232de00750dd521d0ec6b59b4a9149d1938f7e
+# body-sha256: 2d6bde228fb580d1772cde9c8a277f24bc7363fae7efe0a9996c9f8c6e1c4241
 import numpy as np
 
 VERSION = "0.1.0"
@@ -362,7 +362,7 @@ def _attempt(coef, x, carry, p):
         status[open_[done & ~good]] = "NOT_FINITE"
         status[open_[good]] = ""
         x[open_[good]], carry[open_[good]] = total[good], rest[good]
-        slow = np.flatnonzero(finite & ~done & (iteration >= 3) & (size > 0.2 * previous[open_]))
+        slow = np.flatnonzero(finite & ~done & (iteration >= 3) & (size > 0.05 * previous[open_]))
         if len(slow):
             at = open_[slow]
             jacobian[slow] = _differences(_at(coef, at), x[at], p[at], residual[slow])

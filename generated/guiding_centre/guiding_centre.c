@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 96d5980c8705ceb99c0c7fd30262a60efc935874cb6a8dc82c70897176389c79
+ * body-sha256: 4e260edab3f263c84a0530515186aa00bf93e33e1d99d3c5306655f70b40ab7c
  */
 #include "guiding_centre.h"
 
@@ -667,7 +667,7 @@ static guiding_centre_status guiding_centre_attempt(guiding_centre_solver *s, in
             guiding_centre_remember(memory, y, iteration);
             return guiding_centre_OK;
         }
-        if (iteration >= 3 && size > 0.2 * previous && !guiding_centre_differences(s, coef, p, residual, jacobian))
+        if (iteration >= 3 && size > 0.05 * previous && !guiding_centre_differences(s, coef, p, residual, jacobian))
             return guiding_centre_NO_CONVERGENCE;
         if (!guiding_centre_solve(jacobian, residual)) return guiding_centre_SINGULAR;
         for (int i = 0; i < 4; ++i) p[i] -= residual[i];
@@ -1711,6 +1711,7 @@ typedef struct {
 static double guiding_centre_largest_finite(const guiding_centre_lanes size)
 {
     guiding_centre_lanes finite;
+    guiding_centre_EACH_LANE
     for (int lane = 0; lane < guiding_centre_LANES; ++lane) finite[lane] = size[lane] <= DBL_MAX ? size[lane] : 0.0;
     return guiding_centre_largest(finite);
 }
@@ -2094,8 +2095,10 @@ static void guiding_centre_begin(guiding_centre_lanes coef[restrict], guiding_ce
             norm[lane] += e->unit[i][lane];
         }
     }
-    for (int i = 0; i < 4; ++i)
+    for (int i = 0; i < 4; ++i) {
+        guiding_centre_EACH_LANE
         for (int lane = 0; lane < guiding_centre_LANES; ++lane) e->unit[i][lane] = 1.0 / (e->unit[i][lane] + 1e-5 * norm[lane]);
+    }
 }
 
 /* Add the terms of the odd order k and of the next; their size. */
@@ -2136,8 +2139,10 @@ static void guiding_centre_check_end(guiding_centre_lanes coef[restrict], guidin
     static const int field[4] = { 30, 38, 49, 54 };
     guiding_centre_lanes value[55], fixed[1], scale = { 0.0 };
     guiding_centre_values_lanes(coef, e->p, m, value, fixed);
-    for (int i = 0; i < 4; ++i)
+    for (int i = 0; i < 4; ++i) {
+        guiding_centre_EACH_LANE
         for (int lane = 0; lane < guiding_centre_LANES; ++lane) scale[lane] += fabs(m[i][lane]) + fabs(slope[i][lane]);
+    }
     for (int i = 0; i < 4; ++i) {
         guiding_centre_EACH_LANE
         for (int lane = 0; lane < guiding_centre_LANES; ++lane) {
@@ -2176,8 +2181,10 @@ static void guiding_centre_check_ends(guiding_centre_lanes coef[restrict], guidi
 static void guiding_centre_begin_at(guiding_centre_lanes coef[restrict], const guiding_centre_model *model, guiding_centre_expansion *e)
 {
     guiding_centre_lanes m[4];
-    for (int i = 0; i < 4; ++i)
+    for (int i = 0; i < 4; ++i) {
+        guiding_centre_EACH_LANE
         for (int lane = 0; lane < guiding_centre_LANES; ++lane) m[i][lane] = model->y[i][lane] + model->middle[i][lane];
+    }
     guiding_centre_begin(coef, e, m);
 }
 
@@ -2189,8 +2196,10 @@ static void guiding_centre_settle(guiding_centre_lanes coef[restrict], guiding_c
     double left = 1.0;
     memset(model->middle, 0, sizeof model->middle);
     for (int round = 0; left > 1e-9 && round < 12; ++round) {
-        for (int i = 0; i < 4 && round > 0; ++i)
+        for (int i = 0; i < 4 && round > 0; ++i) {
+            guiding_centre_EACH_LANE
             for (int lane = 0; lane < guiding_centre_LANES; ++lane) model->middle[i][lane] = -e->mean[i][lane];
+        }
         guiding_centre_begin_at(coef, model, e);
         guiding_centre_extend(coef, e, 1e-4 * left);
         memset(size, 0, sizeof size);
@@ -2202,6 +2211,7 @@ static void guiding_centre_settle(guiding_centre_lanes coef[restrict], guiding_c
                 norm[lane] += fabs(model->y[i][lane]);
             }
         }
+        guiding_centre_EACH_LANE
         for (int lane = 0; lane < guiding_centre_LANES; ++lane) size[lane] /= norm[lane] + DBL_MIN;
         left = guiding_centre_largest_finite(size);
         if (left > 1.0) left = 1.0;
@@ -2213,8 +2223,10 @@ static void guiding_centre_settle(guiding_centre_lanes coef[restrict], guiding_c
 /* Half of p: paths take the time from -1 to 1. */
 static void guiding_centre_halve(guiding_centre_lanes p[restrict 4])
 {
-    for (int i = 0; i < 4; ++i)
+    for (int i = 0; i < 4; ++i) {
+        guiding_centre_EACH_LANE
         for (int lane = 0; lane < guiding_centre_LANES; ++lane) p[i][lane] *= 0.5;
+    }
 }
 
 /* alpha - y and beta - alpha to leading order, from one short expansion. */
@@ -2226,31 +2238,34 @@ static void guiding_centre_evaluate_lanes(guiding_centre_lanes coef[restrict], g
     guiding_centre_halve(e.p);
     guiding_centre_begin(coef, &e, y);
     guiding_centre_extend(coef, &e, 1e-6);
-    for (int i = 0; i < 4; ++i)
+    for (int i = 0; i < 4; ++i) {
+        guiding_centre_EACH_LANE
         for (int lane = 0; lane < guiding_centre_LANES; ++lane) {
             displacement[i][lane] = (e.even[i][lane] - e.odd[i][lane]) - e.mean[i][lane];
             increment[i][lane] = 2.0 * e.odd[i][lane];
         }
+    }
 }
 
 /* What order j of d(pi p)/dm contributes to order k + 1 of the derivatives. */
 static void guiding_centre_vary_by(guiding_centre_expansion *e, int j, int k)
 {
     guiding_centre_lanes *from = e->v[k - j], *to = e->v[k + 1];
+    const double share = 1.0 / (k + 1);
     guiding_centre_EACH_LANE
     for (int lane = 0; lane < guiding_centre_LANES; ++lane) {
-        const double a00 = e->slope[30][j][lane];
-        const double a01 = e->slope[56][j][lane];
-        const double a03 = e->slope[74][j][lane];
-        const double a10 = e->slope[86][j][lane];
-        const double a11 = e->slope[98][j][lane];
-        const double a13 = e->slope[111][j][lane];
-        const double a20 = e->slope[126][j][lane];
-        const double a21 = e->slope[141][j][lane];
-        const double a23 = e->slope[152][j][lane];
-        const double a30 = e->slope[157][j][lane];
-        const double a31 = e->slope[162][j][lane];
-        const double a33 = e->slope[167][j][lane];
+        const double a00 = share * e->slope[30][j][lane];
+        const double a01 = share * e->slope[56][j][lane];
+        const double a03 = share * e->slope[74][j][lane];
+        const double a10 = share * e->slope[86][j][lane];
+        const double a11 = share * e->slope[98][j][lane];
+        const double a13 = share * e->slope[111][j][lane];
+        const double a20 = share * e->slope[126][j][lane];
+        const double a21 = share * e->slope[141][j][lane];
+        const double a23 = share * e->slope[152][j][lane];
+        const double a30 = share * e->slope[157][j][lane];
+        const double a31 = share * e->slope[162][j][lane];
+        const double a33 = share * e->slope[167][j][lane];
         to[0][lane] += a00 * from[0][lane] + a01 * from[8][lane] + a03 * from[24][lane];
         to[1][lane] += a00 * from[1][lane] + a01 * from[9][lane] + a03 * from[25][lane];
         to[2][lane] += a00 * from[2][lane] + a01 * from[10][lane] + a03 * from[26][lane];
@@ -2290,40 +2305,36 @@ static void guiding_centre_vary_by(guiding_centre_expansion *e, int j, int k)
 static void guiding_centre_vary_order(guiding_centre_expansion *e, int k)
 {
     guiding_centre_lanes *to = e->v[k + 1];
+    const double share = 1.0 / (k + 1);
     memset(to, 0, 32 * sizeof to[0]);
     guiding_centre_EACH_LANE
     for (int lane = 0; lane < guiding_centre_LANES; ++lane) {
-        to[0][lane] += e->slope[30][k][lane];
-        to[1][lane] += e->slope[56][k][lane];
-        to[3][lane] += e->slope[74][k][lane];
-        to[8][lane] += e->slope[86][k][lane];
-        to[9][lane] += e->slope[98][k][lane];
-        to[11][lane] += e->slope[111][k][lane];
-        to[16][lane] += e->slope[126][k][lane];
-        to[17][lane] += e->slope[141][k][lane];
-        to[19][lane] += e->slope[152][k][lane];
-        to[24][lane] += e->slope[157][k][lane];
-        to[25][lane] += e->slope[162][k][lane];
-        to[27][lane] += e->slope[167][k][lane];
-        to[5][lane] += 0.5 * e->slope[168][k][lane];
-        to[6][lane] += 0.5 * e->s[18][k][lane];
-        to[7][lane] += 0.5 * e->slope[169][k][lane];
-        to[12][lane] += 0.5 * e->s[17][k][lane];
-        to[14][lane] += 0.5 * e->s[35][k][lane];
-        to[15][lane] += 0.5 * e->s[32][k][lane];
-        to[20][lane] += 0.5 * e->slope[170][k][lane];
-        to[21][lane] += 0.5 * e->slope[171][k][lane];
-        to[23][lane] += 0.5 * e->s[44][k][lane];
-        to[28][lane] += 0.5 * e->s[28][k][lane];
-        to[29][lane] += 0.5 * e->slope[172][k][lane];
-        to[30][lane] += 0.5 * e->slope[173][k][lane];
+        to[0][lane] += share * e->slope[30][k][lane];
+        to[1][lane] += share * e->slope[56][k][lane];
+        to[3][lane] += share * e->slope[74][k][lane];
+        to[8][lane] += share * e->slope[86][k][lane];
+        to[9][lane] += share * e->slope[98][k][lane];
+        to[11][lane] += share * e->slope[111][k][lane];
+        to[16][lane] += share * e->slope[126][k][lane];
+        to[17][lane] += share * e->slope[141][k][lane];
+        to[19][lane] += share * e->slope[152][k][lane];
+        to[24][lane] += share * e->slope[157][k][lane];
+        to[25][lane] += share * e->slope[162][k][lane];
+        to[27][lane] += share * e->slope[167][k][lane];
+        to[5][lane] += 0.5 * share * e->slope[168][k][lane];
+        to[6][lane] += 0.5 * share * e->s[18][k][lane];
+        to[7][lane] += 0.5 * share * e->slope[169][k][lane];
+        to[12][lane] += 0.5 * share * e->s[17][k][lane];
+        to[14][lane] += 0.5 * share * e->s[35][k][lane];
+        to[15][lane] += 0.5 * share * e->s[32][k][lane];
+        to[20][lane] += 0.5 * share * e->slope[170][k][lane];
+        to[21][lane] += 0.5 * share * e->slope[171][k][lane];
+        to[23][lane] += 0.5 * share * e->s[44][k][lane];
+        to[28][lane] += 0.5 * share * e->s[28][k][lane];
+        to[29][lane] += 0.5 * share * e->slope[172][k][lane];
+        to[30][lane] += 0.5 * share * e->slope[173][k][lane];
     }
     for (int j = 0; j < k; ++j) guiding_centre_vary_by(e, j, k);
-    for (int i = 0; i < 32; ++i) {
-        const double share = 1.0 / (k + 1);
-        guiding_centre_EACH_LANE
-        for (int lane = 0; lane < guiding_centre_LANES; ++lane) to[i][lane] *= share;
-    }
 }
 
 /* Add the terms of the odd order k of the derivatives and of the next, and measure them: those along the middle beside 1,
@@ -2344,6 +2355,7 @@ static void guiding_centre_add_slopes(guiding_centre_expansion *e, int k, guidin
             first[lane] += fabs(e->v[1][i][lane]);
         }
     }
+    guiding_centre_EACH_LANE
     for (int lane = 0; lane < guiding_centre_LANES; ++lane)
         size[lane] = parts[0][lane] + parts[1][lane] / (first[lane] + DBL_MIN);
 }
@@ -2359,9 +2371,11 @@ static void guiding_centre_vary(guiding_centre_lanes coef[restrict], guiding_cen
     memset(e->v_even, 0, sizeof e->v_even);
     memset(e->v_odd, 0, sizeof e->v_odd);
     memset(e->v_mean, 0, sizeof e->v_mean);
-    for (int i = 0; i < 4; ++i)
+    for (int i = 0; i < 4; ++i) {
+        guiding_centre_EACH_LANE
         for (int lane = 0; lane < guiding_centre_LANES; ++lane)
             e->v_even[i * 8 + i][lane] = e->v_mean[i * 8 + i][lane] = 1.0;
+    }
     for (int k = 0; k < 8 && next > 1e-07; ++k) {
         if (k >= e->terms) guiding_centre_next_order(coef, e, k);
         if (k > 0) guiding_centre_follow_slopes(coef, e, k);

@@ -13,7 +13,7 @@
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 5e8d6a305114b0dda5719b4e92965a1d416381a5ef96bf6a63fbbbc754977129
+# body-sha256: f317d9ab0a30ef757881a3c7a112fd98ac0cf520edcd46f73b1374e6e50babb5
 import numpy as np
 
 VERSION = "0.1.0"
@@ -416,7 +416,7 @@ def _attempt(coef, x, carry, p):
         status[open_[done & ~good]] = "NOT_FINITE"
         status[open_[good]] = ""
         x[open_[good]], carry[open_[good]] = total[good], rest[good]
-        slow = np.flatnonzero(finite & ~done & (iteration >= 3) & (size > 0.2 * previous[open_]))
+        slow = np.flatnonzero(finite & ~done & (iteration >= 3) & (size > 0.05 * previous[open_]))
         if len(slow):
             at = open_[slow]
             jacobian[slow] = _differences(_at(coef, at), x[at], p[at], residual[slow])

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 23f7886dec6b221ee9a13ed4479356fae09d00a1d619cd537fcb6d87d9aab7f5
+ * body-sha256: 02417a869dda2af7dd3fca5d495c421ba27a3706c7477954b1c98272ae947440
  */
 #include "nambu_pendulum.h"
 
@@ -481,7 +481,7 @@ static nambu_pendulum_status nambu_pendulum_attempt(nambu_pendulum_solver *s, in
             nambu_pendulum_remember(memory, y, iteration);
             return nambu_pendulum_OK;
         }
-        if (iteration >= 3 && size > 0.2 * previous && !nambu_pendulum_differences(s, coef, p, residual, jacobian))
+        if (iteration >= 3 && size > 0.05 * previous && !nambu_pendulum_differences(s, coef, p, residual, jacobian))
             return nambu_pendulum_NO_CONVERGENCE;
         if (!nambu_pendulum_solve(jacobian, residual)) return nambu_pendulum_SINGULAR;
         for (int i = 0; i < 3; ++i) p[i] -= residual[i];
@@ -982,6 +982,7 @@ typedef struct {
 static double nambu_pendulum_largest_finite(const nambu_pendulum_lanes size)
 {
     nambu_pendulum_lanes finite;
+    nambu_pendulum_EACH_LANE
     for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) finite[lane] = size[lane] <= DBL_MAX ? size[lane] : 0.0;
     return nambu_pendulum_largest(finite);
 }
@@ -1066,8 +1067,10 @@ static void nambu_pendulum_begin(nambu_pendulum_lanes coef[restrict], nambu_pend
             norm[lane] += e->unit[i][lane];
         }
     }
-    for (int i = 0; i < 3; ++i)
+    for (int i = 0; i < 3; ++i) {
+        nambu_pendulum_EACH_LANE
         for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) e->unit[i][lane] = 1.0 / (e->unit[i][lane] + 1e-5 * norm[lane]);
+    }
 }
 
 /* Add the terms of the odd order k and of the next; their size. */
@@ -1108,8 +1111,10 @@ static void nambu_pendulum_check_end(nambu_pendulum_lanes coef[restrict], nambu_
     static const int field[3] = { 10, 6, 7 };
     nambu_pendulum_lanes value[11], fixed[1], scale = { 0.0 };
     nambu_pendulum_values_lanes(coef, e->p, m, value, fixed);
-    for (int i = 0; i < 3; ++i)
+    for (int i = 0; i < 3; ++i) {
+        nambu_pendulum_EACH_LANE
         for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) scale[lane] += fabs(m[i][lane]) + fabs(slope[i][lane]);
+    }
     for (int i = 0; i < 3; ++i) {
         nambu_pendulum_EACH_LANE
         for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) {
@@ -1148,8 +1153,10 @@ static void nambu_pendulum_check_ends(nambu_pendulum_lanes coef[restrict], nambu
 static void nambu_pendulum_begin_at(nambu_pendulum_lanes coef[restrict], const nambu_pendulum_model *model, nambu_pendulum_expansion *e)
 {
     nambu_pendulum_lanes m[3];
-    for (int i = 0; i < 3; ++i)
+    for (int i = 0; i < 3; ++i) {
+        nambu_pendulum_EACH_LANE
         for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) m[i][lane] = model->y[i][lane] + model->middle[i][lane];
+    }
     nambu_pendulum_begin(coef, e, m);
 }
 
@@ -1161,8 +1168,10 @@ static void nambu_pendulum_settle(nambu_pendulum_lanes coef[restrict], nambu_pen
     double left = 1.0;
     memset(model->middle, 0, sizeof model->middle);
     for (int round = 0; left > 1e-9 && round < 12; ++round) {
-        for (int i = 0; i < 3 && round > 0; ++i)
+        for (int i = 0; i < 3 && round > 0; ++i) {
+            nambu_pendulum_EACH_LANE
             for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) model->middle[i][lane] = -e->mean[i][lane];
+        }
         nambu_pendulum_begin_at(coef, model, e);
         nambu_pendulum_extend(coef, e, 1e-4 * left);
         memset(size, 0, sizeof size);
@@ -1174,6 +1183,7 @@ static void nambu_pendulum_settle(nambu_pendulum_lanes coef[restrict], nambu_pen
                 norm[lane] += fabs(model->y[i][lane]);
             }
         }
+        nambu_pendulum_EACH_LANE
         for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) size[lane] /= norm[lane] + DBL_MIN;
         left = nambu_pendulum_largest_finite(size);
         if (left > 1.0) left = 1.0;
@@ -1185,8 +1195,10 @@ static void nambu_pendulum_settle(nambu_pendulum_lanes coef[restrict], nambu_pen
 /* Half of p: paths take the time from -1 to 1. */
 static void nambu_pendulum_halve(nambu_pendulum_lanes p[restrict 3])
 {
-    for (int i = 0; i < 3; ++i)
+    for (int i = 0; i < 3; ++i) {
+        nambu_pendulum_EACH_LANE
         for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) p[i][lane] *= 0.5;
+    }
 }
 
 /* alpha - y and beta - alpha to leading order, from one short expansion. */
@@ -1198,21 +1210,24 @@ static void nambu_pendulum_evaluate_lanes(nambu_pendulum_lanes coef[restrict], n
     nambu_pendulum_halve(e.p);
     nambu_pendulum_begin(coef, &e, y);
     nambu_pendulum_extend(coef, &e, 1e-6);
-    for (int i = 0; i < 3; ++i)
+    for (int i = 0; i < 3; ++i) {
+        nambu_pendulum_EACH_LANE
         for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) {
             displacement[i][lane] = (e.even[i][lane] - e.odd[i][lane]) - e.mean[i][lane];
             increment[i][lane] = 2.0 * e.odd[i][lane];
         }
+    }
 }
 
 /* What order j of d(pi p)/dm contributes to order k + 1 of the derivatives. */
 static void nambu_pendulum_vary_by(nambu_pendulum_expansion *e, int j, int k)
 {
     nambu_pendulum_lanes *from = e->v[k - j], *to = e->v[k + 1];
+    const double share = 1.0 / (k + 1);
     nambu_pendulum_EACH_LANE
     for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) {
-        const double a10 = e->slope[1][j][lane];
-        const double a20 = e->slope[2][j][lane];
+        const double a10 = share * e->slope[1][j][lane];
+        const double a20 = share * e->slope[2][j][lane];
         to[6][lane] += a10 * from[0][lane];
         to[7][lane] += a10 * from[1][lane];
         to[8][lane] += a10 * from[2][lane];
@@ -1232,22 +1247,18 @@ static void nambu_pendulum_vary_by(nambu_pendulum_expansion *e, int j, int k)
 static void nambu_pendulum_vary_order(nambu_pendulum_expansion *e, int k)
 {
     nambu_pendulum_lanes *to = e->v[k + 1];
+    const double share = 1.0 / (k + 1);
     memset(to, 0, 18 * sizeof to[0]);
     nambu_pendulum_EACH_LANE
     for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) {
-        to[6][lane] += e->slope[1][k][lane];
-        to[12][lane] += e->slope[2][k][lane];
-        to[4][lane] += 0.5 * e->slope[3][k][lane];
-        to[9][lane] += 0.5 * e->slope[4][k][lane];
-        to[11][lane] += 0.5 * e->s[9][k][lane];
-        to[16][lane] += 0.5 * e->s[3][k][lane];
+        to[6][lane] += share * e->slope[1][k][lane];
+        to[12][lane] += share * e->slope[2][k][lane];
+        to[4][lane] += 0.5 * share * e->slope[3][k][lane];
+        to[9][lane] += 0.5 * share * e->slope[4][k][lane];
+        to[11][lane] += 0.5 * share * e->s[9][k][lane];
+        to[16][lane] += 0.5 * share * e->s[3][k][lane];
     }
     for (int j = 0; j < k; ++j) nambu_pendulum_vary_by(e, j, k);
-    for (int i = 0; i < 18; ++i) {
-        const double share = 1.0 / (k + 1);
-        nambu_pendulum_EACH_LANE
-        for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) to[i][lane] *= share;
-    }
 }
 
 /* Add the terms of the odd order k of the derivatives and of the next, and measure them: those along the middle beside 1,
@@ -1268,6 +1279,7 @@ static void nambu_pendulum_add_slopes(nambu_pendulum_expansion *e, int k, nambu_
             first[lane] += fabs(e->v[1][i][lane]);
         }
     }
+    nambu_pendulum_EACH_LANE
     for (int lane = 0; lane < nambu_pendulum_LANES; ++lane)
         size[lane] = parts[0][lane] + parts[1][lane] / (first[lane] + DBL_MIN);
 }
@@ -1283,9 +1295,11 @@ static void nambu_pendulum_vary(nambu_pendulum_lanes coef[restrict], nambu_pendu
     memset(e->v_even, 0, sizeof e->v_even);
     memset(e->v_odd, 0, sizeof e->v_odd);
     memset(e->v_mean, 0, sizeof e->v_mean);
-    for (int i = 0; i < 3; ++i)
+    for (int i = 0; i < 3; ++i) {
+        nambu_pendulum_EACH_LANE
         for (int lane = 0; lane < nambu_pendulum_LANES; ++lane)
             e->v_even[i * 6 + i][lane] = e->v_mean[i * 6 + i][lane] = 1.0;
+    }
     for (int k = 0; k < 12 && next > 1e-07; ++k) {
         if (k >= e->terms) nambu_pendulum_next_order(coef, e, k);
         if (k > 0) nambu_pendulum_follow_slopes(coef, e, k);

@@ -12,7 +12,7 @@
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: aca78cdec4288b8e87634549a9dc5e9fc51da2530f26a749ff94c62418380c60
+# body-sha256: 60988aba63ba38182a241e5c44ebff2d8a52062d0f8b09ab1f69584ca4a24aad
 import numpy as np
 
 VERSION = "0.1.0"
@@ -249,7 +249,7 @@ def _attempt(coef, x, carry, p):
         status[open_[done & ~good]] = "NOT_FINITE"
         status[open_[good]] = ""
         x[open_[good]], carry[open_[good]] = total[good], rest[good]
-        slow = np.flatnonzero(finite & ~done & (iteration >= 3) & (size > 0.2 * previous[open_]))
+        slow = np.flatnonzero(finite & ~done & (iteration >= 3) & (size > 0.05 * previous[open_]))
         if len(slow):
             at = open_[slow]
             jacobian[slow] = _differences(_at(coef, at), x[at], p[at], residual[slow])

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: f326864603b70f3e674ac80048879a017ce400a2cacc0a896ad947acf96d3e13
+ * body-sha256: 49151d0ccb216b47e0298b9d51c9509e52ca4f029c37f1a762ddb2c9e0d84453
  */
 #include "sir_epidemic.h"
 
@@ -481,7 +481,7 @@ static sir_epidemic_status sir_epidemic_attempt(sir_epidemic_solver *s, int stag
             sir_epidemic_remember(memory, y, iteration);
             return sir_epidemic_OK;
         }
-        if (iteration >= 3 && size > 0.2 * previous && !sir_epidemic_differences(s, coef, p, residual, jacobian))
+        if (iteration >= 3 && size > 0.05 * previous && !sir_epidemic_differences(s, coef, p, residual, jacobian))
             return sir_epidemic_NO_CONVERGENCE;
         if (!sir_epidemic_solve(jacobian, residual)) return sir_epidemic_SINGULAR;
         for (int i = 0; i < 3; ++i) p[i] -= residual[i];
@@ -941,6 +941,7 @@ typedef struct {
 static double sir_epidemic_largest_finite(const sir_epidemic_lanes size)
 {
     sir_epidemic_lanes finite;
+    sir_epidemic_EACH_LANE
     for (int lane = 0; lane < sir_epidemic_LANES; ++lane) finite[lane] = size[lane] <= DBL_MAX ? size[lane] : 0.0;
     return sir_epidemic_largest(finite);
 }
@@ -1027,8 +1028,10 @@ static void sir_epidemic_begin(sir_epidemic_lanes coef[restrict], sir_epidemic_e
             norm[lane] += e->unit[i][lane];
         }
     }
-    for (int i = 0; i < 3; ++i)
+    for (int i = 0; i < 3; ++i) {
+        sir_epidemic_EACH_LANE
         for (int lane = 0; lane < sir_epidemic_LANES; ++lane) e->unit[i][lane] = 1.0 / (e->unit[i][lane] + 1e-5 * norm[lane]);
+    }
 }
 
 /* Add the terms of the odd order k and of the next; their size. */
@@ -1069,8 +1072,10 @@ static void sir_epidemic_check_end(sir_epidemic_lanes coef[restrict], sir_epidem
     static const int field[3] = { 6, 8, 9 };
     sir_epidemic_lanes value[10], fixed[1], scale = { 0.0 };
     sir_epidemic_values_lanes(coef, e->p, m, value, fixed);
-    for (int i = 0; i < 3; ++i)
+    for (int i = 0; i < 3; ++i) {
+        sir_epidemic_EACH_LANE
         for (int lane = 0; lane < sir_epidemic_LANES; ++lane) scale[lane] += fabs(m[i][lane]) + fabs(slope[i][lane]);
+    }
     for (int i = 0; i < 3; ++i) {
         sir_epidemic_EACH_LANE
         for (int lane = 0; lane < sir_epidemic_LANES; ++lane) {
@@ -1109,8 +1114,10 @@ static void sir_epidemic_check_ends(sir_epidemic_lanes coef[restrict], sir_epide
 static void sir_epidemic_begin_at(sir_epidemic_lanes coef[restrict], const sir_epidemic_model *model, sir_epidemic_expansion *e)
 {
     sir_epidemic_lanes m[3];
-    for (int i = 0; i < 3; ++i)
+    for (int i = 0; i < 3; ++i) {
+        sir_epidemic_EACH_LANE
         for (int lane = 0; lane < sir_epidemic_LANES; ++lane) m[i][lane] = model->y[i][lane] + model->middle[i][lane];
+    }
     sir_epidemic_begin(coef, e, m);
 }
 
@@ -1122,8 +1129,10 @@ static void sir_epidemic_settle(sir_epidemic_lanes coef[restrict], sir_epidemic_
     double left = 1.0;
     memset(model->middle, 0, sizeof model->middle);
     for (int round = 0; left > 1e-9 && round < 12; ++round) {
-        for (int i = 0; i < 3 && round > 0; ++i)
+        for (int i = 0; i < 3 && round > 0; ++i) {
+            sir_epidemic_EACH_LANE
             for (int lane = 0; lane < sir_epidemic_LANES; ++lane) model->middle[i][lane] = -e->mean[i][lane];
+        }
         sir_epidemic_begin_at(coef, model, e);
         sir_epidemic_extend(coef, e, 1e-4 * left);
         memset(size, 0, sizeof size);
@@ -1135,6 +1144,7 @@ static void sir_epidemic_settle(sir_epidemic_lanes coef[restrict], sir_epidemic_
                 norm[lane] += fabs(model->y[i][lane]);
             }
         }
+        sir_epidemic_EACH_LANE
         for (int lane = 0; lane < sir_epidemic_LANES; ++lane) size[lane] /= norm[lane] + DBL_MIN;
         left = sir_epidemic_largest_finite(size);
         if (left > 1.0) left = 1.0;
@@ -1146,8 +1156,10 @@ static void sir_epidemic_settle(sir_epidemic_lanes coef[restrict], sir_epidemic_
 /* Half of p: paths take the time from -1 to 1. */
 static void sir_epidemic_halve(sir_epidemic_lanes p[restrict 3])
 {
-    for (int i = 0; i < 3; ++i)
+    for (int i = 0; i < 3; ++i) {
+        sir_epidemic_EACH_LANE
         for (int lane = 0; lane < sir_epidemic_LANES; ++lane) p[i][lane] *= 0.5;
+    }
 }
 
 /* alpha - y and beta - alpha to leading order, from one short expansion. */
@@ -1159,25 +1171,28 @@ static void sir_epidemic_evaluate_lanes(sir_epidemic_lanes coef[restrict], sir_e
     sir_epidemic_halve(e.p);
     sir_epidemic_begin(coef, &e, y);
     sir_epidemic_extend(coef, &e, 1e-6);
-    for (int i = 0; i < 3; ++i)
+    for (int i = 0; i < 3; ++i) {
+        sir_epidemic_EACH_LANE
         for (int lane = 0; lane < sir_epidemic_LANES; ++lane) {
             displacement[i][lane] = (e.even[i][lane] - e.odd[i][lane]) - e.mean[i][lane];
             increment[i][lane] = 2.0 * e.odd[i][lane];
         }
+    }
 }
 
 /* What order j of d(pi p)/dm contributes to order k + 1 of the derivatives. */
 static void sir_epidemic_vary_by(sir_epidemic_expansion *e, int j, int k)
 {
     sir_epidemic_lanes *from = e->v[k - j], *to = e->v[k + 1];
+    const double share = 1.0 / (k + 1);
     sir_epidemic_EACH_LANE
     for (int lane = 0; lane < sir_epidemic_LANES; ++lane) {
-        const double a00 = e->slope[2][j][lane];
-        const double a01 = e->slope[5][j][lane];
-        const double a10 = e->slope[7][j][lane];
-        const double a11 = e->slope[9][j][lane];
-        const double a20 = e->slope[10][j][lane];
-        const double a21 = e->slope[11][j][lane];
+        const double a00 = share * e->slope[2][j][lane];
+        const double a01 = share * e->slope[5][j][lane];
+        const double a10 = share * e->slope[7][j][lane];
+        const double a11 = share * e->slope[9][j][lane];
+        const double a20 = share * e->slope[10][j][lane];
+        const double a21 = share * e->slope[11][j][lane];
         to[0][lane] += a00 * from[0][lane] + a01 * from[6][lane];
         to[1][lane] += a00 * from[1][lane] + a01 * from[7][lane];
         to[2][lane] += a00 * from[2][lane] + a01 * from[8][lane];
@@ -1203,28 +1218,24 @@ static void sir_epidemic_vary_by(sir_epidemic_expansion *e, int j, int k)
 static void sir_epidemic_vary_order(sir_epidemic_expansion *e, int k)
 {
     sir_epidemic_lanes *to = e->v[k + 1];
+    const double share = 1.0 / (k + 1);
     memset(to, 0, 18 * sizeof to[0]);
     sir_epidemic_EACH_LANE
     for (int lane = 0; lane < sir_epidemic_LANES; ++lane) {
-        to[0][lane] += e->slope[2][k][lane];
-        to[1][lane] += e->slope[5][k][lane];
-        to[6][lane] += e->slope[7][k][lane];
-        to[7][lane] += e->slope[9][k][lane];
-        to[12][lane] += e->slope[10][k][lane];
-        to[13][lane] += e->slope[11][k][lane];
-        to[4][lane] += 0.5 * e->s[3][k][lane];
-        to[5][lane] += 0.5 * e->slope[12][k][lane];
-        to[9][lane] += 0.5 * e->slope[12][k][lane];
-        to[11][lane] += 0.5 * e->s[3][k][lane];
-        to[15][lane] += 0.5 * e->s[3][k][lane];
-        to[16][lane] += 0.5 * e->slope[12][k][lane];
+        to[0][lane] += share * e->slope[2][k][lane];
+        to[1][lane] += share * e->slope[5][k][lane];
+        to[6][lane] += share * e->slope[7][k][lane];
+        to[7][lane] += share * e->slope[9][k][lane];
+        to[12][lane] += share * e->slope[10][k][lane];
+        to[13][lane] += share * e->slope[11][k][lane];
+        to[4][lane] += 0.5 * share * e->s[3][k][lane];
+        to[5][lane] += 0.5 * share * e->slope[12][k][lane];
+        to[9][lane] += 0.5 * share * e->slope[12][k][lane];
+        to[11][lane] += 0.5 * share * e->s[3][k][lane];
+        to[15][lane] += 0.5 * share * e->s[3][k][lane];
+        to[16][lane] += 0.5 * share * e->slope[12][k][lane];
     }
     for (int j = 0; j < k; ++j) sir_epidemic_vary_by(e, j, k);
-    for (int i = 0; i < 18; ++i) {
-        const double share = 1.0 / (k + 1);
-        sir_epidemic_EACH_LANE
-        for (int lane = 0; lane < sir_epidemic_LANES; ++lane) to[i][lane] *= share;
-    }
 }
 
 /* Add the terms of the odd order k of the derivatives and of the next, and measure them: those along the middle beside 1,
@@ -1245,6 +1256,7 @@ static void sir_epidemic_add_slopes(sir_epidemic_expansion *e, int k, sir_epidem
             first[lane] += fabs(e->v[1][i][lane]);
         }
     }
+    sir_epidemic_EACH_LANE
     for (int lane = 0; lane < sir_epidemic_LANES; ++lane)
         size[lane] = parts[0][lane] + parts[1][lane] / (first[lane] + DBL_MIN);
 }
@@ -1260,9 +1272,11 @@ static void sir_epidemic_vary(sir_epidemic_lanes coef[restrict], sir_epidemic_ex
     memset(e->v_even, 0, sizeof e->v_even);
     memset(e->v_odd, 0, sizeof e->v_odd);
     memset(e->v_mean, 0, sizeof e->v_mean);
-    for (int i = 0; i < 3; ++i)
+    for (int i = 0; i < 3; ++i) {
+        sir_epidemic_EACH_LANE
         for (int lane = 0; lane < sir_epidemic_LANES; ++lane)
             e->v_even[i * 6 + i][lane] = e->v_mean[i * 6 + i][lane] = 1.0;
+    }
     for (int k = 0; k < 12 && next > 1e-07; ++k) {
         if (k >= e->terms) sir_epidemic_next_order(coef, e, k);
         if (k > 0) sir_epidemic_follow_slopes(coef, e, k);

@@ -12,7 +12,7 @@
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: db20396fc63b828ba8c63265ba66a7520324ae138632c4b6c19ab3a77d95f32d
+# body-sha256: acef2ec55aa86427b400a43b06db0b025e58ee0fdc07eac3e86ba199e134c1ac
 import numpy as np
 
 VERSION = "0.1.0"
@@ -243,7 +243,7 @@ def _attempt(coef, x, carry, p):
         status[open_[done & ~good]] = "NOT_FINITE"
         status[open_[good]] = ""
         x[open_[good]], carry[open_[good]] = total[good], rest[good]
-        slow = np.flatnonzero(finite & ~done & (iteration >= 3) & (size > 0.2 * previous[open_]))
+        slow = np.flatnonzero(finite & ~done & (iteration >= 3) & (size > 0.05 * previous[open_]))
         if len(slow):
             at = open_[slow]
             jacobian[slow] = _differences(_at(coef, at), x[at], p[at], residual[slow])

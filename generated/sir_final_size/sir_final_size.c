@@ -12,7 +12,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: b0d39dd74cf73bd3ceb7d6963b9c6cad4b169c65510907990e9ad9ea17f59583
+ * body-sha256: da6f3feaaca0a31b81b0ca62d41af5783fa03e3c151d645d174f2a44bf40c56d
  */
 #include "sir_final_size.h"
 
@@ -483,7 +483,7 @@ static sir_final_size_status sir_final_size_attempt(sir_final_size_solver *s, in
             sir_final_size_remember(memory, y, iteration);
             return sir_final_size_OK;
         }
-        if (iteration >= 3 && size > 0.2 * previous && !sir_final_size_differences(s, coef, p, residual, jacobian))
+        if (iteration >= 3 && size > 0.05 * previous && !sir_final_size_differences(s, coef, p, residual, jacobian))
             return sir_final_size_NO_CONVERGENCE;
         if (!sir_final_size_solve(jacobian, residual)) return sir_final_size_SINGULAR;
         for (int i = 0; i < 3; ++i) p[i] -= residual[i];
@@ -954,6 +954,7 @@ typedef struct {
 static double sir_final_size_largest_finite(const sir_final_size_lanes size)
 {
     sir_final_size_lanes finite;
+    sir_final_size_EACH_LANE
     for (int lane = 0; lane < sir_final_size_LANES; ++lane) finite[lane] = size[lane] <= DBL_MAX ? size[lane] : 0.0;
     return sir_final_size_largest(finite);
 }
@@ -1046,8 +1047,10 @@ static void sir_final_size_begin(sir_final_size_lanes coef[restrict], sir_final_
             norm[lane] += e->unit[i][lane];
         }
     }
-    for (int i = 0; i < 3; ++i)
+    for (int i = 0; i < 3; ++i) {
+        sir_final_size_EACH_LANE
         for (int lane = 0; lane < sir_final_size_LANES; ++lane) e->unit[i][lane] = 1.0 / (e->unit[i][lane] + 1e-5 * norm[lane]);
+    }
 }
 
 /* Add the terms of the odd order k and of the next; their size. */
@@ -1088,8 +1091,10 @@ static void sir_final_size_check_end(sir_final_size_lanes coef[restrict], sir_fi
     static const int field[3] = { 6, 9, 13 };
     sir_final_size_lanes value[14], fixed[1], scale = { 0.0 };
     sir_final_size_values_lanes(coef, e->p, m, value, fixed);
-    for (int i = 0; i < 3; ++i)
+    for (int i = 0; i < 3; ++i) {
+        sir_final_size_EACH_LANE
         for (int lane = 0; lane < sir_final_size_LANES; ++lane) scale[lane] += fabs(m[i][lane]) + fabs(slope[i][lane]);
+    }
     for (int i = 0; i < 3; ++i) {
         sir_final_size_EACH_LANE
         for (int lane = 0; lane < sir_final_size_LANES; ++lane) {
@@ -1128,8 +1133,10 @@ static void sir_final_size_check_ends(sir_final_size_lanes coef[restrict], sir_f
 static void sir_final_size_begin_at(sir_final_size_lanes coef[restrict], const sir_final_size_model *model, sir_final_size_expansion *e)
 {
     sir_final_size_lanes m[3];
-    for (int i = 0; i < 3; ++i)
+    for (int i = 0; i < 3; ++i) {
+        sir_final_size_EACH_LANE
         for (int lane = 0; lane < sir_final_size_LANES; ++lane) m[i][lane] = model->y[i][lane] + model->middle[i][lane];
+    }
     sir_final_size_begin(coef, e, m);
 }
 
@@ -1141,8 +1148,10 @@ static void sir_final_size_settle(sir_final_size_lanes coef[restrict], sir_final
     double left = 1.0;
     memset(model->middle, 0, sizeof model->middle);
     for (int round = 0; left > 1e-9 && round < 12; ++round) {
-        for (int i = 0; i < 3 && round > 0; ++i)
+        for (int i = 0; i < 3 && round > 0; ++i) {
+            sir_final_size_EACH_LANE
             for (int lane = 0; lane < sir_final_size_LANES; ++lane) model->middle[i][lane] = -e->mean[i][lane];
+        }
         sir_final_size_begin_at(coef, model, e);
         sir_final_size_extend(coef, e, 1e-4 * left);
         memset(size, 0, sizeof size);
@@ -1154,6 +1163,7 @@ static void sir_final_size_settle(sir_final_size_lanes coef[restrict], sir_final
                 norm[lane] += fabs(model->y[i][lane]);
             }
         }
+        sir_final_size_EACH_LANE
         for (int lane = 0; lane < sir_final_size_LANES; ++lane) size[lane] /= norm[lane] + DBL_MIN;
         left = sir_final_size_largest_finite(size);
         if (left > 1.0) left = 1.0;
@@ -1165,8 +1175,10 @@ static void sir_final_size_settle(sir_final_size_lanes coef[restrict], sir_final
 /* Half of p: paths take the time from -1 to 1. */
 static void sir_final_size_halve(sir_final_size_lanes p[restrict 3])
 {
-    for (int i = 0; i < 3; ++i)
+    for (int i = 0; i < 3; ++i) {
+        sir_final_size_EACH_LANE
         for (int lane = 0; lane < sir_final_size_LANES; ++lane) p[i][lane] *= 0.5;
+    }
 }
 
 /* alpha - y and beta - alpha to leading order, from one short expansion. */
@@ -1178,25 +1190,28 @@ static void sir_final_size_evaluate_lanes(sir_final_size_lanes coef[restrict], s
     sir_final_size_halve(e.p);
     sir_final_size_begin(coef, &e, y);
     sir_final_size_extend(coef, &e, 1e-6);
-    for (int i = 0; i < 3; ++i)
+    for (int i = 0; i < 3; ++i) {
+        sir_final_size_EACH_LANE
         for (int lane = 0; lane < sir_final_size_LANES; ++lane) {
             displacement[i][lane] = (e.even[i][lane] - e.odd[i][lane]) - e.mean[i][lane];
             increment[i][lane] = 2.0 * e.odd[i][lane];
         }
+    }
 }
 
 /* What order j of d(pi p)/dm contributes to order k + 1 of the derivatives. */
 static void sir_final_size_vary_by(sir_final_size_expansion *e, int j, int k)
 {
     sir_final_size_lanes *from = e->v[k - j], *to = e->v[k + 1];
+    const double share = 1.0 / (k + 1);
     sir_final_size_EACH_LANE
     for (int lane = 0; lane < sir_final_size_LANES; ++lane) {
-        const double a00 = e->slope[2][j][lane];
-        const double a01 = e->slope[4][j][lane];
-        const double a10 = e->slope[1][j][lane];
-        const double a11 = e->slope[6][j][lane];
-        const double a20 = e->slope[9][j][lane];
-        const double a21 = e->slope[13][j][lane];
+        const double a00 = share * e->slope[2][j][lane];
+        const double a01 = share * e->slope[4][j][lane];
+        const double a10 = share * e->slope[1][j][lane];
+        const double a11 = share * e->slope[6][j][lane];
+        const double a20 = share * e->slope[9][j][lane];
+        const double a21 = share * e->slope[13][j][lane];
         to[0][lane] += a00 * from[0][lane] + a01 * from[6][lane];
         to[1][lane] += a00 * from[1][lane] + a01 * from[7][lane];
         to[2][lane] += a00 * from[2][lane] + a01 * from[8][lane];
@@ -1222,26 +1237,22 @@ static void sir_final_size_vary_by(sir_final_size_expansion *e, int j, int k)
 static void sir_final_size_vary_order(sir_final_size_expansion *e, int k)
 {
     sir_final_size_lanes *to = e->v[k + 1];
+    const double share = 1.0 / (k + 1);
     memset(to, 0, 18 * sizeof to[0]);
     sir_final_size_EACH_LANE
     for (int lane = 0; lane < sir_final_size_LANES; ++lane) {
-        to[0][lane] += e->slope[2][k][lane];
-        to[1][lane] += e->slope[4][k][lane];
-        to[6][lane] += e->slope[1][k][lane];
-        to[7][lane] += e->slope[6][k][lane];
-        to[12][lane] += e->slope[9][k][lane];
-        to[13][lane] += e->slope[13][k][lane];
-        to[5][lane] += 0.5 * e->slope[14][k][lane];
-        to[11][lane] += 0.5 * e->s[8][k][lane];
-        to[15][lane] += 0.5 * e->s[4][k][lane];
-        to[16][lane] += 0.5 * e->s[11][k][lane];
+        to[0][lane] += share * e->slope[2][k][lane];
+        to[1][lane] += share * e->slope[4][k][lane];
+        to[6][lane] += share * e->slope[1][k][lane];
+        to[7][lane] += share * e->slope[6][k][lane];
+        to[12][lane] += share * e->slope[9][k][lane];
+        to[13][lane] += share * e->slope[13][k][lane];
+        to[5][lane] += 0.5 * share * e->slope[14][k][lane];
+        to[11][lane] += 0.5 * share * e->s[8][k][lane];
+        to[15][lane] += 0.5 * share * e->s[4][k][lane];
+        to[16][lane] += 0.5 * share * e->s[11][k][lane];
     }
     for (int j = 0; j < k; ++j) sir_final_size_vary_by(e, j, k);
-    for (int i = 0; i < 18; ++i) {
-        const double share = 1.0 / (k + 1);
-        sir_final_size_EACH_LANE
-        for (int lane = 0; lane < sir_final_size_LANES; ++lane) to[i][lane] *= share;
-    }
 }
 
 /* Add the terms of the odd order k of the derivatives and of the next, and measure them: those along the middle beside 1,
@@ -1262,6 +1273,7 @@ static void sir_final_size_add_slopes(sir_final_size_expansion *e, int k, sir_fi
             first[lane] += fabs(e->v[1][i][lane]);
         }
     }
+    sir_final_size_EACH_LANE
     for (int lane = 0; lane < sir_final_size_LANES; ++lane)
         size[lane] = parts[0][lane] + parts[1][lane] / (first[lane] + DBL_MIN);
 }
@@ -1277,9 +1289,11 @@ static void sir_final_size_vary(sir_final_size_lanes coef[restrict], sir_final_s
     memset(e->v_even, 0, sizeof e->v_even);
     memset(e->v_odd, 0, sizeof e->v_odd);
     memset(e->v_mean, 0, sizeof e->v_mean);
-    for (int i = 0; i < 3; ++i)
+    for (int i = 0; i < 3; ++i) {
+        sir_final_size_EACH_LANE
         for (int lane = 0; lane < sir_final_size_LANES; ++lane)
             e->v_even[i * 6 + i][lane] = e->v_mean[i * 6 + i][lane] = 1.0;
+    }
     for (int k = 0; k < 12 && next > 1e-07; ++k) {
         if (k >= e->terms) sir_final_size_next_order(coef, e, k);
         if (k > 0) sir_final_size_follow_slopes(coef, e, k);

@@ -11,7 +11,7 @@
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 5bff1e0864309630c3611a70425fd1ea417c643d63a43cda1c5ac1e53d8b1943
+# body-sha256: 23840a97cafc1aa3d2fec7e46cb49e806097a5b3986c6c418e896fc585edbecb
 import numpy as np
 
 VERSION = "0.1.0"
@@ -247,7 +247,7 @@ def _attempt(coef, x, carry, p):
         status[open_[done & ~good]] = "NOT_FINITE"
         status[open_[good]] = ""
         x[open_[good]], carry[open_[good]] = total[good], rest[good]
-        slow = np.flatnonzero(finite & ~done & (iteration >= 3) & (size > 0.2 * previous[open_]))
+        slow = np.flatnonzero(finite & ~done & (iteration >= 3) & (size > 0.05 * previous[open_]))
         if len(slow):
             at = open_[slow]
             jacobian[slow] = _differences(_at(coef, at), x[at], p[at], residual[slow])

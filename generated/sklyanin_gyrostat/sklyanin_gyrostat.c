@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: b1200351ed7ffcca10a0ed827eb72c3feccf489640d5e9eba3103b11fc8b06c1
+ * body-sha256: ec9b13584aae1f2a98b14e476fe365e23e90e794ed67d967958a1fa00294df9b
  */
 #include "sklyanin_gyrostat.h"
 
@@ -666,7 +666,7 @@ static sklyanin_gyrostat_status sklyanin_gyrostat_attempt(sklyanin_gyrostat_solv
             sklyanin_gyrostat_remember(memory, y, iteration);
             return sklyanin_gyrostat_OK;
         }
-        if (iteration >= 3 && size > 0.2 * previous && !sklyanin_gyrostat_differences(s, coef, p, residual, jacobian))
+        if (iteration >= 3 && size > 0.05 * previous && !sklyanin_gyrostat_differences(s, coef, p, residual, jacobian))
             return sklyanin_gyrostat_NO_CONVERGENCE;
         if (!sklyanin_gyrostat_solve(jacobian, residual)) return sklyanin_gyrostat_SINGULAR;
         for (int i = 0; i < 4; ++i) p[i] -= residual[i];
@@ -1594,6 +1594,7 @@ typedef struct {
 static double sklyanin_gyrostat_largest_finite(const sklyanin_gyrostat_lanes size)
 {
     sklyanin_gyrostat_lanes finite;
+    sklyanin_gyrostat_EACH_LANE
     for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) finite[lane] = size[lane] <= DBL_MAX ? size[lane] : 0.0;
     return sklyanin_gyrostat_largest(finite);
 }
@@ -1752,8 +1753,10 @@ static void sklyanin_gyrostat_begin(sklyanin_gyrostat_lanes coef[restrict], skly
             norm[lane] += e->unit[i][lane];
         }
     }
-    for (int i = 0; i < 4; ++i)
+    for (int i = 0; i < 4; ++i) {
+        sklyanin_gyrostat_EACH_LANE
         for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) e->unit[i][lane] = 1.0 / (e->unit[i][lane] + 1e-5 * norm[lane]);
+    }
 }
 
 /* Add the terms of the odd order k and of the next; their size. */
@@ -1794,8 +1797,10 @@ static void sklyanin_gyrostat_check_end(sklyanin_gyrostat_lanes coef[restrict], 
     static const int field[4] = { 13, 23, 32, 39 };
     sklyanin_gyrostat_lanes value[40], fixed[1], scale = { 0.0 };
     sklyanin_gyrostat_values_lanes(coef, e->p, m, value, fixed);
-    for (int i = 0; i < 4; ++i)
+    for (int i = 0; i < 4; ++i) {
+        sklyanin_gyrostat_EACH_LANE
         for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) scale[lane] += fabs(m[i][lane]) + fabs(slope[i][lane]);
+    }
     for (int i = 0; i < 4; ++i) {
         sklyanin_gyrostat_EACH_LANE
         for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) {
@@ -1834,8 +1839,10 @@ static void sklyanin_gyrostat_check_ends(sklyanin_gyrostat_lanes coef[restrict],
 static void sklyanin_gyrostat_begin_at(sklyanin_gyrostat_lanes coef[restrict], const sklyanin_gyrostat_model *model, sklyanin_gyrostat_expansion *e)
 {
     sklyanin_gyrostat_lanes m[4];
-    for (int i = 0; i < 4; ++i)
+    for (int i = 0; i < 4; ++i) {
+        sklyanin_gyrostat_EACH_LANE
         for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) m[i][lane] = model->y[i][lane] + model->middle[i][lane];
+    }
     sklyanin_gyrostat_begin(coef, e, m);
 }
 
@@ -1847,8 +1854,10 @@ static void sklyanin_gyrostat_settle(sklyanin_gyrostat_lanes coef[restrict], skl
     double left = 1.0;
     memset(model->middle, 0, sizeof model->middle);
     for (int round = 0; left > 1e-9 && round < 12; ++round) {
-        for (int i = 0; i < 4 && round > 0; ++i)
+        for (int i = 0; i < 4 && round > 0; ++i) {
+            sklyanin_gyrostat_EACH_LANE
             for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) model->middle[i][lane] = -e->mean[i][lane];
+        }
         sklyanin_gyrostat_begin_at(coef, model, e);
         sklyanin_gyrostat_extend(coef, e, 1e-4 * left);
         memset(size, 0, sizeof size);
@@ -1860,6 +1869,7 @@ static void sklyanin_gyrostat_settle(sklyanin_gyrostat_lanes coef[restrict], skl
                 norm[lane] += fabs(model->y[i][lane]);
             }
         }
+        sklyanin_gyrostat_EACH_LANE
         for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) size[lane] /= norm[lane] + DBL_MIN;
         left = sklyanin_gyrostat_largest_finite(size);
         if (left > 1.0) left = 1.0;
@@ -1871,8 +1881,10 @@ static void sklyanin_gyrostat_settle(sklyanin_gyrostat_lanes coef[restrict], skl
 /* Half of p: paths take the time from -1 to 1. */
 static void sklyanin_gyrostat_halve(sklyanin_gyrostat_lanes p[restrict 4])
 {
-    for (int i = 0; i < 4; ++i)
+    for (int i = 0; i < 4; ++i) {
+        sklyanin_gyrostat_EACH_LANE
         for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) p[i][lane] *= 0.5;
+    }
 }
 
 /* alpha - y and beta - alpha to leading order, from one short expansion. */
@@ -1884,31 +1896,34 @@ static void sklyanin_gyrostat_evaluate_lanes(sklyanin_gyrostat_lanes coef[restri
     sklyanin_gyrostat_halve(e.p);
     sklyanin_gyrostat_begin(coef, &e, y);
     sklyanin_gyrostat_extend(coef, &e, 1e-6);
-    for (int i = 0; i < 4; ++i)
+    for (int i = 0; i < 4; ++i) {
+        sklyanin_gyrostat_EACH_LANE
         for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) {
             displacement[i][lane] = (e.even[i][lane] - e.odd[i][lane]) - e.mean[i][lane];
             increment[i][lane] = 2.0 * e.odd[i][lane];
         }
+    }
 }
 
 /* What order j of d(pi p)/dm contributes to order k + 1 of the derivatives. */
 static void sklyanin_gyrostat_vary_by(sklyanin_gyrostat_expansion *e, int j, int k)
 {
     sklyanin_gyrostat_lanes *from = e->v[k - j], *to = e->v[k + 1];
+    const double share = 1.0 / (k + 1);
     sklyanin_gyrostat_EACH_LANE
     for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) {
-        const double a01 = e->slope[3][j][lane];
-        const double a02 = e->slope[7][j][lane];
-        const double a03 = e->slope[12][j][lane];
-        const double a10 = e->slope[15][j][lane];
-        const double a12 = e->slope[20][j][lane];
-        const double a13 = e->slope[25][j][lane];
-        const double a20 = e->slope[28][j][lane];
-        const double a21 = e->slope[30][j][lane];
-        const double a23 = e->slope[35][j][lane];
-        const double a30 = e->slope[37][j][lane];
-        const double a31 = e->slope[38][j][lane];
-        const double a32 = e->slope[39][j][lane];
+        const double a01 = share * e->slope[3][j][lane];
+        const double a02 = share * e->slope[7][j][lane];
+        const double a03 = share * e->slope[12][j][lane];
+        const double a10 = share * e->slope[15][j][lane];
+        const double a12 = share * e->slope[20][j][lane];
+        const double a13 = share * e->slope[25][j][lane];
+        const double a20 = share * e->slope[28][j][lane];
+        const double a21 = share * e->slope[30][j][lane];
+        const double a23 = share * e->slope[35][j][lane];
+        const double a30 = share * e->slope[37][j][lane];
+        const double a31 = share * e->slope[38][j][lane];
+        const double a32 = share * e->slope[39][j][lane];
         to[0][lane] += a01 * from[8][lane] + a02 * from[16][lane] + a03 * from[24][lane];
         to[1][lane] += a01 * from[9][lane] + a02 * from[17][lane] + a03 * from[25][lane];
         to[2][lane] += a01 * from[10][lane] + a02 * from[18][lane] + a03 * from[26][lane];
@@ -1948,40 +1963,36 @@ static void sklyanin_gyrostat_vary_by(sklyanin_gyrostat_expansion *e, int j, int
 static void sklyanin_gyrostat_vary_order(sklyanin_gyrostat_expansion *e, int k)
 {
     sklyanin_gyrostat_lanes *to = e->v[k + 1];
+    const double share = 1.0 / (k + 1);
     memset(to, 0, 32 * sizeof to[0]);
     sklyanin_gyrostat_EACH_LANE
     for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) {
-        to[1][lane] += e->slope[3][k][lane];
-        to[2][lane] += e->slope[7][k][lane];
-        to[3][lane] += e->slope[12][k][lane];
-        to[8][lane] += e->slope[15][k][lane];
-        to[10][lane] += e->slope[20][k][lane];
-        to[11][lane] += e->slope[25][k][lane];
-        to[16][lane] += e->slope[28][k][lane];
-        to[17][lane] += e->slope[30][k][lane];
-        to[19][lane] += e->slope[35][k][lane];
-        to[24][lane] += e->slope[37][k][lane];
-        to[25][lane] += e->slope[38][k][lane];
-        to[26][lane] += e->slope[39][k][lane];
-        to[5][lane] += 0.5 * e->slope[40][k][lane];
-        to[6][lane] += 0.5 * e->slope[41][k][lane];
-        to[7][lane] += 0.5 * e->slope[42][k][lane];
-        to[12][lane] += 0.5 * e->slope[43][k][lane];
-        to[14][lane] += 0.5 * e->slope[44][k][lane];
-        to[15][lane] += 0.5 * e->slope[45][k][lane];
-        to[20][lane] += 0.5 * e->slope[46][k][lane];
-        to[21][lane] += 0.5 * e->slope[47][k][lane];
-        to[23][lane] += 0.5 * e->slope[48][k][lane];
-        to[28][lane] += 0.5 * e->s[11][k][lane];
-        to[29][lane] += 0.5 * e->slope[49][k][lane];
-        to[30][lane] += 0.5 * e->slope[50][k][lane];
+        to[1][lane] += share * e->slope[3][k][lane];
+        to[2][lane] += share * e->slope[7][k][lane];
+        to[3][lane] += share * e->slope[12][k][lane];
+        to[8][lane] += share * e->slope[15][k][lane];
+        to[10][lane] += share * e->slope[20][k][lane];
+        to[11][lane] += share * e->slope[25][k][lane];
+        to[16][lane] += share * e->slope[28][k][lane];
+        to[17][lane] += share * e->slope[30][k][lane];
+        to[19][lane] += share * e->slope[35][k][lane];
+        to[24][lane] += share * e->slope[37][k][lane];
+        to[25][lane] += share * e->slope[38][k][lane];
+        to[26][lane] += share * e->slope[39][k][lane];
+        to[5][lane] += 0.5 * share * e->slope[40][k][lane];
+        to[6][lane] += 0.5 * share * e->slope[41][k][lane];
+        to[7][lane] += 0.5 * share * e->slope[42][k][lane];
+        to[12][lane] += 0.5 * share * e->slope[43][k][lane];
+        to[14][lane] += 0.5 * share * e->slope[44][k][lane];
+        to[15][lane] += 0.5 * share * e->slope[45][k][lane];
+        to[20][lane] += 0.5 * share * e->slope[46][k][lane];
+        to[21][lane] += 0.5 * share * e->slope[47][k][lane];
+        to[23][lane] += 0.5 * share * e->slope[48][k][lane];
+        to[28][lane] += 0.5 * share * e->s[11][k][lane];
+        to[29][lane] += 0.5 * share * e->slope[49][k][lane];
+        to[30][lane] += 0.5 * share * e->slope[50][k][lane];
     }
     for (int j = 0; j < k; ++j) sklyanin_gyrostat_vary_by(e, j, k);
-    for (int i = 0; i < 32; ++i) {
-        const double share = 1.0 / (k + 1);
-        sklyanin_gyrostat_EACH_LANE
-        for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) to[i][lane] *= share;
-    }
 }
 
 /* Add the terms of the odd order k of the derivatives and of the next, and measure them: those along the middle beside 1,
@@ -2002,6 +2013,7 @@ static void sklyanin_gyrostat_add_slopes(sklyanin_gyrostat_expansion *e, int k, 
             first[lane] += fabs(e->v[1][i][lane]);
         }
     }
+    sklyanin_gyrostat_EACH_LANE
     for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane)
         size[lane] = parts[0][lane] + parts[1][lane] / (first[lane] + DBL_MIN);
 }
@@ -2017,9 +2029,11 @@ static void sklyanin_gyrostat_vary(sklyanin_gyrostat_lanes coef[restrict], sklya
     memset(e->v_even, 0, sizeof e->v_even);
     memset(e->v_odd, 0, sizeof e->v_odd);
     memset(e->v_mean, 0, sizeof e->v_mean);
-    for (int i = 0; i < 4; ++i)
+    for (int i = 0; i < 4; ++i) {
+        sklyanin_gyrostat_EACH_LANE
         for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane)
             e->v_even[i * 8 + i][lane] = e->v_mean[i * 8 + i][lane] = 1.0;
+    }
     for (int k = 0; k < 12 && next > 1e-07; ++k) {
         if (k >= e->terms) sklyanin_gyrostat_next_order(coef, e, k);
         if (k > 0) sklyanin_gyrostat_follow_slopes(coef, e, k);

@@ -13,7 +13,7 @@
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 698df80fac2068c322a2d5932fb0f908c15b31d3088c26d5c244f1e660f05a4e
+# body-sha256: f2ad05269d30d65014724cd8a9f7363866c494180a5a9746ee90c22914cb63c3
 import numpy as np
 
 VERSION = "0.1.0"
@@ -431,7 +431,7 @@ def _attempt(coef, x, carry, p):
         status[open_[done & ~good]] = "NOT_FINITE"
         status[open_[good]] = ""
         x[open_[good]], carry[open_[good]] = total[good], rest[good]
-        slow = np.flatnonzero(finite & ~done & (iteration >= 3) & (size > 0.2 * previous[open_]))
+        slow = np.flatnonzero(finite & ~done & (iteration >= 3) & (size > 0.05 * previous[open_]))
         if len(slow):
             at = open_[slow]
             jacobian[slow] = _differences(_at(coef, at), x[at], p[at], residual[slow])

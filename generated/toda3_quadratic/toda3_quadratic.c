@@ -12,7 +12,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 4f3e92241c128b3c2dcfe0a5730d1837dbee30109e68a59da495e3f7980c30e7
+ * body-sha256: b474bf1b68766c33a3abb0365cbd662013505db0b5ab5f2ec7ddb3d2b2aced20
  */
 #include "toda3_quadratic.h"
 
@@ -546,7 +546,7 @@ static toda3_quadratic_status toda3_quadratic_attempt(toda3_quadratic_solver *s,
             toda3_quadratic_remember(memory, y, iteration);
             return toda3_quadratic_OK;
         }
-        if (iteration >= 3 && size > 0.2 * previous && !toda3_quadratic_differences(s, coef, p, residual, jacobian))
+        if (iteration >= 3 && size > 0.05 * previous && !toda3_quadratic_differences(s, coef, p, residual, jacobian))
             return toda3_quadratic_NO_CONVERGENCE;
         if (!toda3_quadratic_solve(jacobian, residual)) return toda3_quadratic_SINGULAR;
         for (int i = 0; i < 5; ++i) p[i] -= residual[i];

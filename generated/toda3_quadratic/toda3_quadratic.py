@@ -11,7 +11,7 @@
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 64a91e61573d080128ed937e51bd4d9d50c4dc64ec9a1e387e7924438a5d8d06
+# body-sha256: c56a3f955ad575b52749eb9cb9e4e33e7ca2fc505b2da179f4c8262c6eeea680
 import numpy as np
 
 VERSION = "0.1.0"
@@ -348,7 +348,7 @@ def _attempt(coef, x, carry, p):
         status[open_[done & ~good]] = "NOT_FINITE"
         status[open_[good]] = ""
         x[open_[good]], carry[open_[good]] = total[good], rest[good]
-        slow = np.flatnonzero(finite & ~done & (iteration >= 3) & (size > 0.2 * previous[open_]))
+        slow = np.flatnonzero(finite & ~done & (iteration >= 3) & (size > 0.05 * previous[open_]))
         if len(slow):
             at = open_[slow]
             jacobian[slow] = _differences(_at(coef, at), x[at], p[at], residual[slow])

@@ -3,7 +3,7 @@
 import mpmath
 import numpy as np
 import pytest
-from precise_path import PATH_DIGITS, PrecisePathStep, PreciseSystem, compile_paths
+from precise_path import PATH_DIGITS, PrecisePathStep, PreciseSystem, by_paths, compile_paths
 from support import BODY, TARGETS, RawC, gradient, solver, values
 
 from phigen import StepError
@@ -137,3 +137,12 @@ def test_steps_too_large_for_the_equation_fail_cleanly():
             assert abs(raw.x @ raw.x - 1.65) < 1e-13
     assert 0 in statuses
     assert len(statuses) > 1
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_steps_where_the_approximate_matrix_gains_little_are_solved_in_time(target):
+    """It is right up to O(h²): at these h an iteration with it gains less than a digit."""
+    solve = solver(by_paths("rigid_body", 4), target)
+    for h in (0.95, 1.0, 1.05, 1.1):
+        x = solve.integrate((0.1, 1.0, 0.1), h=h, steps=20).x
+        assert np.ptp(np.sum(x**2, axis=1)) < 30 * EPS

@@ -218,18 +218,19 @@ def _linear(program: Program, q: Series, show: Any) -> str:
 def _variation(program: Program, jacobian: Sequence[Entry]) -> list[str]:
     """The product of ∂(π p)/∂m and the derivatives so far, to be added."""
     n = program.dimension
-    lines = [f"const double a{e.row}{e.column} = {_place(program, e.series)}[j][lane];" for e in jacobian]
+    lines = [f"const double a{e.row}{e.column} = share * {_place(program, e.series)}[j][lane];" for e in jacobian]
     for row in range(n):
         columns = [e.column for e in jacobian if e.row == row]
         for k in range(2 * n if columns else 0):
             products = " + ".join(f"a{row}{c} * from[{c * 2 * n + k}][lane]" for c in columns)
             lines.append(f"to[{row * 2 * n + k}][lane] += {products};")
-    return lines or ["(void)from, (void)to, (void)j;"]
+    return lines or ["(void)from, (void)to, (void)share;"]
 
 
 def _source(program: Program, slopes: PathSlopes) -> list[str]:
     """What order k of ∂(π p)/∂m contributes by itself, and half of π: the derivative along p is that of ½π(m)p."""
     n = program.dimension
-    along_m = [(e.row * 2 * n + e.column, "", e) for e in slopes.jacobian]
-    along_p = [(e.row * 2 * n + n + e.column, "0.5 * ", e) for e in slopes.tensor]
-    return [f"to[{i}][lane] += {half}{_place(program, e.series)}[k][lane];" for i, half, e in (*along_m, *along_p)]
+    along_m = [(e.row * 2 * n + e.column, "share", e) for e in slopes.jacobian]
+    along_p = [(e.row * 2 * n + n + e.column, "0.5 * share", e) for e in slopes.tensor]
+    every = [*along_m, *along_p]
+    return [f"to[{i}][lane] += {factor} * {_place(program, e.series)}[k][lane];" for i, factor, e in every]
