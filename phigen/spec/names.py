@@ -77,7 +77,7 @@ BIREALISATIONS = (
 )
 POISSON_FORMS = ("matrix", "brackets", "canonical", "log_canonical", "lie_algebra", "nambu", "product", "pullback")
 #: Compositions of the flows of the parts of a splitting, and all.
-FLOW_COMPOSITIONS = ("blanes-moan", "blanes-moan-rkn", "force-gradient")
+FLOW_COMPOSITIONS = ("blanes-moan", "blanes-moan-rkn", "nystrom", "force-gradient")
 COMPOSITIONS = (
     "auto",
     "none",
