@@ -25,7 +25,7 @@ SYSTEMS = {
     "root": (ROOT, (0.9, -0.5, 0.3), 0.05, 24, (-0.07, 0.02, 0.0)),  # x runs into 0
     "kink": (KINK, (-0.8, 0.3), 0.05, 60, (0.1, 0.0)),  # paths across x = 0, where their series does not converge
     "turning": (TURNING, (0.2, 0.5, -0.7), 6.0, 40, (0.0, 0.01, 0.0)),  # a turn in each step: more than one piece
-    "turned": (TURNING, (0.2, 0.5, -0.7), 1.0, 60, (0.0, 0.01, 0.0)),  # more terms than an expansion has in lanes
+    "turned": (TURNING, (0.2, 0.5, -0.7), 2.5, 60, (0.0, 0.01, 0.0)),  # more terms than an expansion has in lanes
 }
 
 
