@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 4e260edab3f263c84a0530515186aa00bf93e33e1d99d3c5306655f70b40ab7c
+ * body-sha256: e603bc0c5f65d2798ca760c8483a8cf05f1dbafbe91cee080ce2f137e23e7968
  */
 #include "guiding_centre.h"
 
@@ -1716,12 +1716,12 @@ static double guiding_centre_largest_finite(const guiding_centre_lanes size)
     return guiding_centre_largest(finite);
 }
 
-/* Coefficient k >= 1 of the series that follow from those of the coordinates: sums over the orders between 0 and k, then what else there is. */
+/* Coefficient k >= 1 of the series that follow from those of the coordinates: sums over the orders between 0 and k,
+   then what else there is. */
 static void guiding_centre_follow(guiding_centre_lanes coef[restrict], guiding_centre_expansion *e, int k)
 {
     const double share = 1.0 / k;
     guiding_centre_lanes sum[19];
-    (void)coef, (void)e, (void)share;
     memset(sum, 0, sizeof sum);
     for (int j = 1; j < k; ++j) {
         guiding_centre_EACH_LANE
@@ -1803,12 +1803,12 @@ static void guiding_centre_follow(guiding_centre_lanes coef[restrict], guiding_c
     }
 }
 
-/* Coefficient k >= 1 of the further series: sums over the orders between 0 and k, then what else there is. */
+/* Coefficient k >= 1 of the further series: sums over the orders between 0 and k,
+   then what else there is. */
 static void guiding_centre_follow_slopes(guiding_centre_lanes coef[restrict], guiding_centre_expansion *e, int k)
 {
     const double share = 1.0 / k;
     guiding_centre_lanes sum[62];
-    (void)coef, (void)e, (void)share;
     memset(sum, 0, sizeof sum);
     for (int j = 1; j < k; ++j) {
         guiding_centre_EACH_LANE

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 02417a869dda2af7dd3fca5d495c421ba27a3706c7477954b1c98272ae947440
+ * body-sha256: a226fa7727f2b7058114da2097481acf3f3342fc3641617296fc2b77ecbceb0b
  */
 #include "nambu_pendulum.h"
 
@@ -987,12 +987,13 @@ static double nambu_pendulum_largest_finite(const nambu_pendulum_lanes size)
     return nambu_pendulum_largest(finite);
 }
 
-/* Coefficient k >= 1 of the series that follow from those of the coordinates: sums over the orders between 0 and k, then what else there is. */
+/* Coefficient k >= 1 of the series that follow from those of the coordinates: sums over the orders between 0 and k,
+   then what else there is. */
 static void nambu_pendulum_follow(nambu_pendulum_lanes coef[restrict], nambu_pendulum_expansion *e, int k)
 {
     const double share = 1.0 / k;
+    (void)coef;
     nambu_pendulum_lanes sum[2];
-    (void)coef, (void)e, (void)share;
     memset(sum, 0, sizeof sum);
     for (int j = 1; j < k; ++j) {
         nambu_pendulum_EACH_LANE
@@ -1014,24 +1015,20 @@ static void nambu_pendulum_follow(nambu_pendulum_lanes coef[restrict], nambu_pen
     }
 }
 
-/* Coefficient k >= 1 of the further series: sums over the orders between 0 and k, then what else there is. */
+/* Coefficient k >= 1 of the further series: sums over the orders between 0 and k,
+   then what else there is. */
 static void nambu_pendulum_follow_slopes(nambu_pendulum_lanes coef[restrict], nambu_pendulum_expansion *e, int k)
 {
-    const double share = 1.0 / k;
+    (void)coef;
     nambu_pendulum_lanes sum[1];
-    (void)coef, (void)e, (void)share;
     memset(sum, 0, sizeof sum);
     for (int j = 1; j < k; ++j) {
-        nambu_pendulum_EACH_LANE
-        for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) {
-            sum[0][lane] += e->s[10][j][lane] * e->s[8][k - j][lane];
-        }
     }
     nambu_pendulum_EACH_LANE
     for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) {
         e->slope[0][k][lane] = e->p[2][lane] * e->s[8][k][lane];
         e->slope[1][k][lane] = -e->slope[0][k][lane];
-        e->slope[2][k][lane] = sum[0][lane] + e->s[10][0][lane] * e->s[8][k][lane] + e->s[10][k][lane] * e->s[8][0][lane];
+        e->slope[2][k][lane] = e->s[10][0][lane] * e->s[8][k][lane];
         e->slope[3][k][lane] = 0.0;
         e->slope[4][k][lane] = 0.0;
     }

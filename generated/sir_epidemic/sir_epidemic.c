@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 49151d0ccb216b47e0298b9d51c9509e52ca4f029c37f1a762ddb2c9e0d84453
+ * body-sha256: 4fb096630d414f2b323f849f6742817bb090f0e39d58796834f417ef3fe008a0
  */
 #include "sir_epidemic.h"
 
@@ -946,12 +946,12 @@ static double sir_epidemic_largest_finite(const sir_epidemic_lanes size)
     return sir_epidemic_largest(finite);
 }
 
-/* Coefficient k >= 1 of the series that follow from those of the coordinates: sums over the orders between 0 and k, then what else there is. */
+/* Coefficient k >= 1 of the series that follow from those of the coordinates: sums over the orders between 0 and k,
+   then what else there is. */
 static void sir_epidemic_follow(sir_epidemic_lanes coef[restrict], sir_epidemic_expansion *e, int k)
 {
-    const double share = 1.0 / k;
+    (void)coef;
     sir_epidemic_lanes sum[1];
-    (void)coef, (void)e, (void)share;
     memset(sum, 0, sizeof sum);
     for (int j = 1; j < k; ++j) {
         sir_epidemic_EACH_LANE
@@ -971,12 +971,12 @@ static void sir_epidemic_follow(sir_epidemic_lanes coef[restrict], sir_epidemic_
     }
 }
 
-/* Coefficient k >= 1 of the further series: sums over the orders between 0 and k, then what else there is. */
+/* Coefficient k >= 1 of the further series: sums over the orders between 0 and k,
+   then what else there is. */
 static void sir_epidemic_follow_slopes(sir_epidemic_lanes coef[restrict], sir_epidemic_expansion *e, int k)
 {
-    const double share = 1.0 / k;
+    (void)coef;
     sir_epidemic_lanes sum[1];
-    (void)coef, (void)e, (void)share;
     memset(sum, 0, sizeof sum);
     for (int j = 1; j < k; ++j) {
     }

@@ -12,7 +12,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: da6f3feaaca0a31b81b0ca62d41af5783fa03e3c151d645d174f2a44bf40c56d
+ * body-sha256: 347dc93da96115c7be6df4d8ce5b4c1e67c23ad84b983fb7e59d80da648b30b9
  */
 #include "sir_final_size.h"
 
@@ -959,12 +959,11 @@ static double sir_final_size_largest_finite(const sir_final_size_lanes size)
     return sir_final_size_largest(finite);
 }
 
-/* Coefficient k >= 1 of the series that follow from those of the coordinates: sums over the orders between 0 and k, then what else there is. */
+/* Coefficient k >= 1 of the series that follow from those of the coordinates: sums over the orders between 0 and k,
+   then what else there is. */
 static void sir_final_size_follow(sir_final_size_lanes coef[restrict], sir_final_size_expansion *e, int k)
 {
-    const double share = 1.0 / k;
     sir_final_size_lanes sum[1];
-    (void)coef, (void)e, (void)share;
     memset(sum, 0, sizeof sum);
     for (int j = 1; j < k; ++j) {
         sir_final_size_EACH_LANE
@@ -988,12 +987,11 @@ static void sir_final_size_follow(sir_final_size_lanes coef[restrict], sir_final
     }
 }
 
-/* Coefficient k >= 1 of the further series: sums over the orders between 0 and k, then what else there is. */
+/* Coefficient k >= 1 of the further series: sums over the orders between 0 and k,
+   then what else there is. */
 static void sir_final_size_follow_slopes(sir_final_size_lanes coef[restrict], sir_final_size_expansion *e, int k)
 {
-    const double share = 1.0 / k;
     sir_final_size_lanes sum[1];
-    (void)coef, (void)e, (void)share;
     memset(sum, 0, sizeof sum);
     for (int j = 1; j < k; ++j) {
     }

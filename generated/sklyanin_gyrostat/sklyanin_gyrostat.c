@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: ec9b13584aae1f2a98b14e476fe365e23e90e794ed67d967958a1fa00294df9b
+ * body-sha256: b034b2a0cdfd95f9a490649ac7b02d53a45787dd865708563a45f1118e871879
  */
 #include "sklyanin_gyrostat.h"
 
@@ -1599,12 +1599,12 @@ static double sklyanin_gyrostat_largest_finite(const sklyanin_gyrostat_lanes siz
     return sklyanin_gyrostat_largest(finite);
 }
 
-/* Coefficient k >= 1 of the series that follow from those of the coordinates: sums over the orders between 0 and k, then what else there is. */
+/* Coefficient k >= 1 of the series that follow from those of the coordinates: sums over the orders between 0 and k,
+   then what else there is. */
 static void sklyanin_gyrostat_follow(sklyanin_gyrostat_lanes coef[restrict], sklyanin_gyrostat_expansion *e, int k)
 {
-    const double share = 1.0 / k;
+    (void)coef;
     sklyanin_gyrostat_lanes sum[6];
-    (void)coef, (void)e, (void)share;
     memset(sum, 0, sizeof sum);
     for (int j = 1; j < k; ++j) {
         sklyanin_gyrostat_EACH_LANE
@@ -1658,12 +1658,12 @@ static void sklyanin_gyrostat_follow(sklyanin_gyrostat_lanes coef[restrict], skl
     }
 }
 
-/* Coefficient k >= 1 of the further series: sums over the orders between 0 and k, then what else there is. */
+/* Coefficient k >= 1 of the further series: sums over the orders between 0 and k,
+   then what else there is. */
 static void sklyanin_gyrostat_follow_slopes(sklyanin_gyrostat_lanes coef[restrict], sklyanin_gyrostat_expansion *e, int k)
 {
-    const double share = 1.0 / k;
+    (void)coef;
     sklyanin_gyrostat_lanes sum[1];
-    (void)coef, (void)e, (void)share;
     memset(sum, 0, sizeof sum);
     for (int j = 1; j < k; ++j) {
     }

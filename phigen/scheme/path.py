@@ -129,6 +129,7 @@ class _Builder:
         self.series = [Series(symbol(c)) for c in coordinates]
         self.fixed: list[Expression] = []
         self._series_of: dict[int, int] = {}
+        self._in_motion: set[int] = set()
         self._fixed_of: dict[int, Expression] = {}
         self._keep: list[Expression] = []
 
@@ -152,8 +153,8 @@ class _Builder:
     def _include(self, roots: Sequence[Expression]) -> None:
         order = closure(roots)
         self._keep += order  # values are found by id, so the nodes must live
-        moving = self._moving(order)
-        fresh = [e for e in order if id(e) in moving and id(e) not in self._series_of]
+        self._in_motion |= self._moving(order)
+        fresh = [e for e in order if id(e) in self._in_motion and id(e) not in self._series_of]
         for e in fresh:
             if e.op == "symbol":
                 self._series_of[id(e)] = self.coordinates.index(e.value)
@@ -194,7 +195,7 @@ class _Builder:
     def _rule(self, e: Expression) -> Series:
         values = [self._value(a) for a in e.args]
         first = raw(e.op, tuple(values), e.value)
-        moving = [(k, self._series_of[id(a)]) for k, a in enumerate(e.args) if id(a) in self._series_of]
+        moving = [(k, self._series_of[id(a)]) for k, a in enumerate(e.args) if id(a) in self._in_motion]
         one, minus = raw("number", (), Fraction(1)), raw("number", (), Fraction(-1))
         match e.op:
             case "add":

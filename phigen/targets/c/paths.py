@@ -157,9 +157,10 @@ def _printer(program: Program) -> Any:
     return lambda e: show(expand_powers([e])[0])
 
 
-def _rules(program: Program, every: Sequence[Series], numbers: range) -> tuple[int, list[str], list[str]]:
-    """Coefficient k ≥ 1 of the series of these numbers: the count of sums over orders, loops over lanes that add what
-    orders j and k − j contribute to these, and loops for the rest, which may need coefficients of order k."""
+def _rules(program: Program, every: Sequence[Series], numbers: range) -> tuple[list[str], int, list[str], list[str]]:
+    """Coefficient k ≥ 1 of the series of these numbers: the first lines of the function, the count of sums over orders,
+    loops over lanes that add what orders j and k − j contribute to these, and loops for the rest, which may need
+    coefficients of order k."""
     between: list[str] = []
     ends: list[str] = []
     show = _printer(program)
@@ -174,7 +175,10 @@ def _rules(program: Program, every: Sequence[Series], numbers: range) -> tuple[i
         if q.divisor is not None:
             value = f"({value}) / {_place(program, q.divisor)}[0][lane]"
         ends.append(f"{_place(program, i)}[k][lane] = {value};")
-    return max(1, len(between)), _loops(program, between), _loops(program, ends)
+    text = "\n".join([*between, *ends])
+    head = ["const double share = 1.0 / k;"] if "share" in text else []
+    head += [f"(void){name};" for name, use in (("coef", "coef["), ("e", "e->")) if use not in text]
+    return head, max(1, len(between)), _loops(program, between), _loops(program, ends)
 
 
 def _loops(program: Program, statements: Sequence[str]) -> list[str]:
