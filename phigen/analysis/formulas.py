@@ -154,7 +154,8 @@ def latex(e: Expression) -> str:
 
     from phigen.geometry.sympy_bridge import to_sympy
 
-    return str(sympy.latex(to_sympy(e)))
+    written = str(sympy.latex(to_sympy(e)))
+    return written.replace("κ", r"\kappa").replace("λ", r"\lambda")
 
 
 def with_plain_names(expressions: Sequence[Expression]) -> list[Expression]:

@@ -1,5 +1,6 @@
 """Methods for {V, {V, {V, T}}} = 0: order conditions, the choice of the compiler, kicks with modified potential."""
 
+import time
 from dataclasses import replace
 from fractions import Fraction
 from itertools import pairwise
@@ -10,7 +11,10 @@ from splitting import nystrom_algebra as algebra
 from support import TARGETS, compile_text, compiled, setting, solver
 
 from phigen.analysis import measures
+from phigen.analysis.flows import formulas
+from phigen.analysis.latex import document
 from phigen.analysis.methods import of_solver
+from phigen.compiler import emit
 from phigen.errors import SpecError
 from phigen.scheme import alternation, choosing, nystrom
 from phigen.scheme.order import Order
@@ -186,3 +190,28 @@ def test_a_condition_that_does_not_hold_is_refuted():
     found = compiled("rigid_body", 6, "splitting")
     refuted = [s.name for s in check(found.system, replace(found.splitting, kick=0)) if s.verdict == REFUTED]
     assert refuted == ["{H_1, {H_1, {H_1, H_2}}} = 0"]
+
+
+def test_the_multiple_of_the_gradient_has_its_letter_in_formulas_and_files():
+    found = compiled("kowalevski_top", 8, "splitting")
+    assert r"H_{1} &= G_{1} + \kappa" in document(found)
+    assert dict(formulas(found, None))["H_1"] == "G1 + κ*(G2**2 + 1/2*G3**2)"
+    assert (
+        "the flow of H_1 = G1 + κ*(G2**2 + 1/2*G3**2)"
+        in emit(found.program, "c", "", single_file=True)["kowalevski_top.c"]
+    )
+
+
+def test_four_bodies_are_decided_by_degrees_and_kicked_plainly():
+    names = [f"{c}{i}" for i in range(4) for c in "xy"]
+    forces = [f"1/sqrt((x{i} - x{j})**2 + (y{i} - y{j})**2)" for i in range(4) for j in range(i)]
+    kinetic, potential = " + ".join(f"p{n}**2" for n in names), " - ".join(forces)
+    momenta = ", ".join(f"p{n}" for n in names)
+    text = (
+        f"coordinates: [{', '.join(names)}, {momenta}]\n"
+        f"poisson: {{canonical: {{q: [{', '.join(names)}], p: [{momenta}]}}}}\n"
+        f"hamiltonian: ({kinetic})/2 - {potential}\n"
+    )
+    start = time.perf_counter()
+    assert composition_of(text, 6) == ("blanes-moan-rkn", False)
+    assert time.perf_counter() - start < 10
