@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: e6762af18840a03910ef05119d81893d4f400535cf668ce9ea075308ca5d8bd2
+ * body-sha256: a8f92c0a5902c2550e9c8c88ffee7fb55d8f9bee04d8aaf31d16a410329c0d08
  */
 #include "cyclotron.h"
 
@@ -116,21 +116,17 @@ static void cyclotron_eliminate(const double matrix[9], const double side[3], do
                                 double reciprocal[restrict 3])
 {
     const double t1 = 1.0 / matrix[0];
-    const double t2 = matrix[6] * t1;
-    const double t3 = matrix[3] * t1;
-    const double t4 = side[1] - side[0] * t3;
-    const double t5 = 1.0 / (matrix[4] - matrix[1] * t3);
-    const double t6 = (matrix[7] - matrix[1] * t2) * t5;
-    const double t7 = matrix[5] - matrix[2] * t3;
-    const double t8 = 1.0 / (matrix[8] - matrix[2] * t2 - t7 * t6);
-    const double t9 = (side[2] - side[0] * t2 - t4 * t6) * t8;
-    const double t10 = t5 * (t4 - t7 * t9);
-    solution[0] = t1 * (side[0] - (matrix[2] * t9 + matrix[1] * t10));
-    solution[1] = t10;
-    solution[2] = t9;
+    const double t2 = 1.0 / matrix[8];
+    const double t3 = side[0] - side[2] * (matrix[2] * t2);
+    const double t4 = matrix[3] * t1;
+    const double t5 = 1.0 / (matrix[4] - matrix[1] * t4);
+    const double t6 = t5 * (side[1] - side[2] * (matrix[5] * t2) - t4 * t3);
+    solution[0] = t1 * (t3 - matrix[1] * t6);
+    solution[1] = t6;
+    solution[2] = side[2] * t2;
     reciprocal[0] = t1;
     reciprocal[1] = t5;
-    reciprocal[2] = t8;
+    reciprocal[2] = t2;
 }
 
 /* Solve matrix * solution = side, both overwritten. The matrix is I + O(h), so elimination without pivoting
@@ -483,10 +479,10 @@ typedef struct {
     cyclotron_lanes coef[1][3], weight[1][32][3];
 } cyclotron_table;
 
-/* A stage in all lanes, linearised around y: a residual r of alpha(y) = x takes inverse r from y and gain r from the
-   increment. */
+/* A stage in all lanes, linearised around y. */
 typedef struct {
     cyclotron_lanes y[3], displacement[3], increment[3], residual[3];
+    /* a residual r of alpha(y) = x takes inverse r from y, and gain r from the increment */
     cyclotron_lanes inverse[9], slope[9], gain[9];
 } cyclotron_model;
 
@@ -1120,6 +1116,27 @@ static int cyclotron_group_solve(cyclotron_group *group, int stage, cyclotron_mo
     return iterations;
 }
 
+/* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
+static void cyclotron_group_advance(cyclotron_lanes x[restrict 3], cyclotron_lanes carry[restrict 3],
+    cyclotron_model *model)
+{
+    for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j) {
+            cyclotron_EACH_LANE
+            for (int lane = 0; lane < cyclotron_LANES; ++lane)
+                carry[i][lane] -= model->gain[i * 3 + j][lane] * model->residual[j][lane];
+        }
+    for (int i = 0; i < 3; ++i) {
+        cyclotron_EACH_LANE
+        for (int lane = 0; lane < cyclotron_LANES; ++lane) {
+            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
+            const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
+            x[i][lane] = sum + small;
+            carry[i][lane] = small - (x[i][lane] - sum);
+        }
+    }
+}
+
 /* Members that failed, or whose state is not finite, keep the state before the step, and leave. How many stay. */
 static int cyclotron_group_leave(cyclotron_group *group, cyclotron_lanes x[3], cyclotron_lanes carry[3],
     size_t remaining)
@@ -1141,27 +1158,6 @@ static int cyclotron_group_leave(cyclotron_group *group, cyclotron_lanes x[3], c
         if (!group->active[lane] && group->left[lane] == 0) group->left[lane] = remaining;
     }
     return active;
-}
-
-/* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
-static void cyclotron_group_advance(cyclotron_lanes x[restrict 3], cyclotron_lanes carry[restrict 3],
-    cyclotron_model *model)
-{
-    for (int i = 0; i < 3; ++i)
-        for (int j = 0; j < 3; ++j) {
-            cyclotron_EACH_LANE
-            for (int lane = 0; lane < cyclotron_LANES; ++lane)
-                carry[i][lane] -= model->gain[i * 3 + j][lane] * model->residual[j][lane];
-        }
-    for (int i = 0; i < 3; ++i) {
-        cyclotron_EACH_LANE
-        for (int lane = 0; lane < cyclotron_LANES; ++lane) {
-            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
-            const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
-            x[i][lane] = sum + small;
-            carry[i][lane] = small - (x[i][lane] - sum);
-        }
-    }
 }
 
 /* One step of all members, of as many as remain. How many members are left. */

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 83eccfe6f698e70cc74cacadccb12377280555cb3e60d3eea11fe8540f4339dd
+ * body-sha256: 37294db43d53fd518081149f03627fa446c9c73861c044f8ae027d8e348bbde8
  */
 #include "engel_geodesics.h"
 
@@ -145,32 +145,25 @@ static int engel_geodesics_solve_pivoting(double matrix[16], double side[4])
 static void engel_geodesics_eliminate(const double matrix[16], const double side[4],
                                       double solution[restrict 4], double reciprocal[restrict 4])
 {
-    const double t1 = 1.0 / matrix[0];
-    const double t2 = matrix[12] * t1;
-    const double t3 = matrix[4] * t1;
-    const double t4 = side[1] - side[0] * t3;
-    const double t5 = 1.0 / (matrix[5] - matrix[1] * t3);
-    const double t6 = (matrix[13] - matrix[1] * t2) * t5;
-    const double t7 = matrix[8] * t1;
-    const double t8 = (matrix[9] - matrix[1] * t7) * t5;
-    const double t9 = side[2] - side[0] * t7 - t4 * t8;
-    const double t10 = matrix[6] - matrix[2] * t3;
-    const double t11 = 1.0 / (matrix[10] - matrix[2] * t7 - t10 * t8);
-    const double t12 = (matrix[14] - matrix[2] * t2 - t10 * t6) * t11;
-    const double t13 = matrix[7] - matrix[3] * t3;
-    const double t14 = matrix[11] - matrix[3] * t7 - t13 * t8;
-    const double t15 = 1.0 / (matrix[15] - matrix[3] * t2 - t13 * t6 - t14 * t12);
-    const double t16 = (side[3] - side[0] * t2 - t4 * t6 - t9 * t12) * t15;
-    const double t17 = t11 * (t9 - t14 * t16);
-    const double t18 = t5 * (t4 - (t13 * t16 + t10 * t17));
-    solution[0] = t1 * (side[0] - (matrix[3] * t16 + (matrix[2] * t17 + matrix[1] * t18)));
-    solution[1] = t18;
-    solution[2] = t17;
-    solution[3] = t16;
-    reciprocal[0] = t1;
-    reciprocal[1] = t5;
-    reciprocal[2] = t11;
-    reciprocal[3] = t15;
+    const double t1 = 1.0 / matrix[5];
+    const double t2 = matrix[1] * t1;
+    const double t3 = 1.0 / (matrix[0] - matrix[4] * t2);
+    const double t4 = 1.0 / matrix[15];
+    const double t5 = side[1] - side[3] * (matrix[7] * t4);
+    const double t6 = side[0] - side[3] * (matrix[3] * t4) - t2 * t5;
+    const double t7 = matrix[2] - matrix[6] * t2;
+    const double t8 = matrix[8] * t3;
+    const double t9 = 1.0 / (matrix[10] - t7 * t8);
+    const double t10 = (side[2] - side[3] * (matrix[11] * t4) - t6 * t8) * t9;
+    const double t11 = t3 * (t6 - t7 * t10);
+    solution[0] = t11;
+    solution[1] = t1 * (t5 - (matrix[6] * t10 + matrix[4] * t11));
+    solution[2] = t10;
+    solution[3] = side[3] * t4;
+    reciprocal[0] = t3;
+    reciprocal[1] = t1;
+    reciprocal[2] = t9;
+    reciprocal[3] = t4;
 }
 
 /* Solve matrix * solution = side, both overwritten. The matrix is I + O(h), so elimination without pivoting
@@ -524,10 +517,10 @@ typedef struct {
     engel_geodesics_lanes coef[1][3], weight[1][32][4];
 } engel_geodesics_table;
 
-/* A stage in all lanes, linearised around y: a residual r of alpha(y) = x takes inverse r from y and gain r from the
-   increment. */
+/* A stage in all lanes, linearised around y. */
 typedef struct {
     engel_geodesics_lanes y[4], displacement[4], increment[4], residual[4];
+    /* a residual r of alpha(y) = x takes inverse r from y, and gain r from the increment */
     engel_geodesics_lanes inverse[16], slope[16], gain[16];
 } engel_geodesics_model;
 
@@ -1232,6 +1225,27 @@ static int engel_geodesics_group_solve(engel_geodesics_group *group, int stage, 
     return iterations;
 }
 
+/* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
+static void engel_geodesics_group_advance(engel_geodesics_lanes x[restrict 4], engel_geodesics_lanes carry[restrict 4],
+    engel_geodesics_model *model)
+{
+    for (int i = 0; i < 4; ++i)
+        for (int j = 0; j < 4; ++j) {
+            engel_geodesics_EACH_LANE
+            for (int lane = 0; lane < engel_geodesics_LANES; ++lane)
+                carry[i][lane] -= model->gain[i * 4 + j][lane] * model->residual[j][lane];
+        }
+    for (int i = 0; i < 4; ++i) {
+        engel_geodesics_EACH_LANE
+        for (int lane = 0; lane < engel_geodesics_LANES; ++lane) {
+            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
+            const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
+            x[i][lane] = sum + small;
+            carry[i][lane] = small - (x[i][lane] - sum);
+        }
+    }
+}
+
 /* Members that failed, or whose state is not finite, keep the state before the step, and leave. How many stay. */
 static int engel_geodesics_group_leave(engel_geodesics_group *group, engel_geodesics_lanes x[4], engel_geodesics_lanes carry[4],
     size_t remaining)
@@ -1253,27 +1267,6 @@ static int engel_geodesics_group_leave(engel_geodesics_group *group, engel_geode
         if (!group->active[lane] && group->left[lane] == 0) group->left[lane] = remaining;
     }
     return active;
-}
-
-/* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
-static void engel_geodesics_group_advance(engel_geodesics_lanes x[restrict 4], engel_geodesics_lanes carry[restrict 4],
-    engel_geodesics_model *model)
-{
-    for (int i = 0; i < 4; ++i)
-        for (int j = 0; j < 4; ++j) {
-            engel_geodesics_EACH_LANE
-            for (int lane = 0; lane < engel_geodesics_LANES; ++lane)
-                carry[i][lane] -= model->gain[i * 4 + j][lane] * model->residual[j][lane];
-        }
-    for (int i = 0; i < 4; ++i) {
-        engel_geodesics_EACH_LANE
-        for (int lane = 0; lane < engel_geodesics_LANES; ++lane) {
-            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
-            const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
-            x[i][lane] = sum + small;
-            carry[i][lane] = small - (x[i][lane] - sum);
-        }
-    }
 }
 
 /* One step of all members, of as many as remain. How many members are left. */

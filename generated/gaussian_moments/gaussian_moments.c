@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: de839a9329cef0ac199eec83dbedc5d798a4c0baf40c512dcec24ef5fc0a1733
+ * body-sha256: 4c9c34a29099da8a8d89630c2c3ea0dbe4e3a46755a22ce1b8b16fb2e1de2b7f
  */
 #include "gaussian_moments.h"
 
@@ -631,10 +631,10 @@ typedef struct {
     gaussian_moments_lanes coef[1][14], weight[1][32][3];
 } gaussian_moments_table;
 
-/* A stage in all lanes, linearised around y: a residual r of alpha(y) = x takes inverse r from y and gain r from the
-   increment. */
+/* A stage in all lanes, linearised around y. */
 typedef struct {
     gaussian_moments_lanes y[3], displacement[3], increment[3], residual[3];
+    /* a residual r of alpha(y) = x takes inverse r from y, and gain r from the increment */
     gaussian_moments_lanes inverse[9], slope[9], gain[9];
 } gaussian_moments_model;
 
@@ -1360,6 +1360,27 @@ static int gaussian_moments_group_solve(gaussian_moments_group *group, int stage
     return iterations;
 }
 
+/* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
+static void gaussian_moments_group_advance(gaussian_moments_lanes x[restrict 3], gaussian_moments_lanes carry[restrict 3],
+    gaussian_moments_model *model)
+{
+    for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j) {
+            gaussian_moments_EACH_LANE
+            for (int lane = 0; lane < gaussian_moments_LANES; ++lane)
+                carry[i][lane] -= model->gain[i * 3 + j][lane] * model->residual[j][lane];
+        }
+    for (int i = 0; i < 3; ++i) {
+        gaussian_moments_EACH_LANE
+        for (int lane = 0; lane < gaussian_moments_LANES; ++lane) {
+            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
+            const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
+            x[i][lane] = sum + small;
+            carry[i][lane] = small - (x[i][lane] - sum);
+        }
+    }
+}
+
 /* Members that failed, or whose state is not finite, keep the state before the step, and leave. How many stay. */
 static int gaussian_moments_group_leave(gaussian_moments_group *group, gaussian_moments_lanes x[3], gaussian_moments_lanes carry[3],
     size_t remaining)
@@ -1381,27 +1402,6 @@ static int gaussian_moments_group_leave(gaussian_moments_group *group, gaussian_
         if (!group->active[lane] && group->left[lane] == 0) group->left[lane] = remaining;
     }
     return active;
-}
-
-/* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
-static void gaussian_moments_group_advance(gaussian_moments_lanes x[restrict 3], gaussian_moments_lanes carry[restrict 3],
-    gaussian_moments_model *model)
-{
-    for (int i = 0; i < 3; ++i)
-        for (int j = 0; j < 3; ++j) {
-            gaussian_moments_EACH_LANE
-            for (int lane = 0; lane < gaussian_moments_LANES; ++lane)
-                carry[i][lane] -= model->gain[i * 3 + j][lane] * model->residual[j][lane];
-        }
-    for (int i = 0; i < 3; ++i) {
-        gaussian_moments_EACH_LANE
-        for (int lane = 0; lane < gaussian_moments_LANES; ++lane) {
-            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
-            const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
-            x[i][lane] = sum + small;
-            carry[i][lane] = small - (x[i][lane] - sum);
-        }
-    }
 }
 
 /* One step of all members, of as many as remain. How many members are left. */

@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: e603bc0c5f65d2798ca760c8483a8cf05f1dbafbe91cee080ce2f137e23e7968
+ * body-sha256: ded5b381c3215d5806933527d1578b4161da4a8665c9b6af99a3348e6d875923
  */
 #include "guiding_centre.h"
 
@@ -766,10 +766,10 @@ typedef struct {
     guiding_centre_lanes coef[5][5], weight[5][32][4];
 } guiding_centre_table;
 
-/* A stage in all lanes, linearised around y: a residual r of alpha(y) = x takes inverse r from y and gain r from the
-   increment. */
+/* A stage in all lanes, linearised around y. */
 typedef struct {
     guiding_centre_lanes y[4], displacement[4], increment[4], residual[4];
+    /* a residual r of alpha(y) = x takes inverse r from y, and gain r from the increment */
     guiding_centre_lanes inverse[16], slope[16], gain[16];
     guiding_centre_lanes middle[4]; /* of the path, less y */
     guiding_centre_lanes alpha_y[16], increment_y[16]; /* of alpha and beta - alpha, with p held fixed */

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 46bc58e450e1f1dc448c2a4c42d1ca343e4c79777bcdb992a5f1d61072cfefad
+ * body-sha256: 61619071b211b268aeb3cc2cf621664094bd9f76c27302f38587d7ecbadae6eb
  */
 #include "harmonic_oscillator.h"
 
@@ -463,10 +463,10 @@ typedef struct {
     harmonic_oscillator_lanes coef[1][5], weight[1][32][2];
 } harmonic_oscillator_table;
 
-/* A stage in all lanes, linearised around y: a residual r of alpha(y) = x takes inverse r from y and gain r from the
-   increment. */
+/* A stage in all lanes, linearised around y. */
 typedef struct {
     harmonic_oscillator_lanes y[2], displacement[2], increment[2], residual[2];
+    /* a residual r of alpha(y) = x takes inverse r from y, and gain r from the increment */
     harmonic_oscillator_lanes inverse[4], slope[4], gain[4];
 } harmonic_oscillator_model;
 
@@ -1057,6 +1057,27 @@ static int harmonic_oscillator_group_solve(harmonic_oscillator_group *group, int
     return iterations;
 }
 
+/* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
+static void harmonic_oscillator_group_advance(harmonic_oscillator_lanes x[restrict 2], harmonic_oscillator_lanes carry[restrict 2],
+    harmonic_oscillator_model *model)
+{
+    for (int i = 0; i < 2; ++i)
+        for (int j = 0; j < 2; ++j) {
+            harmonic_oscillator_EACH_LANE
+            for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane)
+                carry[i][lane] -= model->gain[i * 2 + j][lane] * model->residual[j][lane];
+        }
+    for (int i = 0; i < 2; ++i) {
+        harmonic_oscillator_EACH_LANE
+        for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane) {
+            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
+            const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
+            x[i][lane] = sum + small;
+            carry[i][lane] = small - (x[i][lane] - sum);
+        }
+    }
+}
+
 /* Members that failed, or whose state is not finite, keep the state before the step, and leave. How many stay. */
 static int harmonic_oscillator_group_leave(harmonic_oscillator_group *group, harmonic_oscillator_lanes x[2], harmonic_oscillator_lanes carry[2],
     size_t remaining)
@@ -1078,27 +1099,6 @@ static int harmonic_oscillator_group_leave(harmonic_oscillator_group *group, har
         if (!group->active[lane] && group->left[lane] == 0) group->left[lane] = remaining;
     }
     return active;
-}
-
-/* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
-static void harmonic_oscillator_group_advance(harmonic_oscillator_lanes x[restrict 2], harmonic_oscillator_lanes carry[restrict 2],
-    harmonic_oscillator_model *model)
-{
-    for (int i = 0; i < 2; ++i)
-        for (int j = 0; j < 2; ++j) {
-            harmonic_oscillator_EACH_LANE
-            for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane)
-                carry[i][lane] -= model->gain[i * 2 + j][lane] * model->residual[j][lane];
-        }
-    for (int i = 0; i < 2; ++i) {
-        harmonic_oscillator_EACH_LANE
-        for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane) {
-            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
-            const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
-            x[i][lane] = sum + small;
-            carry[i][lane] = small - (x[i][lane] - sum);
-        }
-    }
 }
 
 /* One step of all members, of as many as remain. How many members are left. */

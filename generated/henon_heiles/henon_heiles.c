@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 4fdd5fe97acc0ac550e7130a883569f74198241ba6a828cfa1ea6391c145cb4f
+ * body-sha256: 7fc5ec5affe83e2bf438bd048eda3e22fbe3986a87739fc0b17e3f238d9895a4
  */
 #include "henon_heiles.h"
 
@@ -566,10 +566,10 @@ typedef struct {
     henon_heiles_lanes coef[1][24], weight[1][32][4];
 } henon_heiles_table;
 
-/* A stage in all lanes, linearised around y: a residual r of alpha(y) = x takes inverse r from y and gain r from the
-   increment. */
+/* A stage in all lanes, linearised around y. */
 typedef struct {
     henon_heiles_lanes y[4], displacement[4], increment[4], residual[4];
+    /* a residual r of alpha(y) = x takes inverse r from y, and gain r from the increment */
     henon_heiles_lanes inverse[16], slope[16], gain[16];
 } henon_heiles_model;
 
@@ -1289,6 +1289,27 @@ static int henon_heiles_group_solve(henon_heiles_group *group, int stage, henon_
     return iterations;
 }
 
+/* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
+static void henon_heiles_group_advance(henon_heiles_lanes x[restrict 4], henon_heiles_lanes carry[restrict 4],
+    henon_heiles_model *model)
+{
+    for (int i = 0; i < 4; ++i)
+        for (int j = 0; j < 4; ++j) {
+            henon_heiles_EACH_LANE
+            for (int lane = 0; lane < henon_heiles_LANES; ++lane)
+                carry[i][lane] -= model->gain[i * 4 + j][lane] * model->residual[j][lane];
+        }
+    for (int i = 0; i < 4; ++i) {
+        henon_heiles_EACH_LANE
+        for (int lane = 0; lane < henon_heiles_LANES; ++lane) {
+            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
+            const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
+            x[i][lane] = sum + small;
+            carry[i][lane] = small - (x[i][lane] - sum);
+        }
+    }
+}
+
 /* Members that failed, or whose state is not finite, keep the state before the step, and leave. How many stay. */
 static int henon_heiles_group_leave(henon_heiles_group *group, henon_heiles_lanes x[4], henon_heiles_lanes carry[4],
     size_t remaining)
@@ -1310,27 +1331,6 @@ static int henon_heiles_group_leave(henon_heiles_group *group, henon_heiles_lane
         if (!group->active[lane] && group->left[lane] == 0) group->left[lane] = remaining;
     }
     return active;
-}
-
-/* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
-static void henon_heiles_group_advance(henon_heiles_lanes x[restrict 4], henon_heiles_lanes carry[restrict 4],
-    henon_heiles_model *model)
-{
-    for (int i = 0; i < 4; ++i)
-        for (int j = 0; j < 4; ++j) {
-            henon_heiles_EACH_LANE
-            for (int lane = 0; lane < henon_heiles_LANES; ++lane)
-                carry[i][lane] -= model->gain[i * 4 + j][lane] * model->residual[j][lane];
-        }
-    for (int i = 0; i < 4; ++i) {
-        henon_heiles_EACH_LANE
-        for (int lane = 0; lane < henon_heiles_LANES; ++lane) {
-            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
-            const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
-            x[i][lane] = sum + small;
-            carry[i][lane] = small - (x[i][lane] - sum);
-        }
-    }
 }
 
 /* One step of all members, of as many as remain. How many members are left. */

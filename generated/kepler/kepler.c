@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 87bd0908bea8fe81a4cfa44abb6c8186f8b401edf96e4734d781ec828249416e
+ * body-sha256: cc1bc34f5e6bac0172df3534452bd585ddeb1bf0879ccb7043ce42901ac03965
  */
 #include "kepler.h"
 
@@ -876,10 +876,10 @@ typedef struct {
     kepler_lanes coef[1][118], weight[1][32][4];
 } kepler_table;
 
-/* A stage in all lanes, linearised around y: a residual r of alpha(y) = x takes inverse r from y and gain r from the
-   increment. */
+/* A stage in all lanes, linearised around y. */
 typedef struct {
     kepler_lanes y[4], displacement[4], increment[4], residual[4];
+    /* a residual r of alpha(y) = x takes inverse r from y, and gain r from the increment */
     kepler_lanes inverse[16], slope[16], gain[16];
 } kepler_model;
 
@@ -1811,6 +1811,27 @@ static int kepler_group_solve(kepler_group *group, int stage, kepler_model *mode
     return iterations;
 }
 
+/* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
+static void kepler_group_advance(kepler_lanes x[restrict 4], kepler_lanes carry[restrict 4],
+    kepler_model *model)
+{
+    for (int i = 0; i < 4; ++i)
+        for (int j = 0; j < 4; ++j) {
+            kepler_EACH_LANE
+            for (int lane = 0; lane < kepler_LANES; ++lane)
+                carry[i][lane] -= model->gain[i * 4 + j][lane] * model->residual[j][lane];
+        }
+    for (int i = 0; i < 4; ++i) {
+        kepler_EACH_LANE
+        for (int lane = 0; lane < kepler_LANES; ++lane) {
+            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
+            const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
+            x[i][lane] = sum + small;
+            carry[i][lane] = small - (x[i][lane] - sum);
+        }
+    }
+}
+
 /* Members that failed, or whose state is not finite, keep the state before the step, and leave. How many stay. */
 static int kepler_group_leave(kepler_group *group, kepler_lanes x[4], kepler_lanes carry[4],
     size_t remaining)
@@ -1832,27 +1853,6 @@ static int kepler_group_leave(kepler_group *group, kepler_lanes x[4], kepler_lan
         if (!group->active[lane] && group->left[lane] == 0) group->left[lane] = remaining;
     }
     return active;
-}
-
-/* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
-static void kepler_group_advance(kepler_lanes x[restrict 4], kepler_lanes carry[restrict 4],
-    kepler_model *model)
-{
-    for (int i = 0; i < 4; ++i)
-        for (int j = 0; j < 4; ++j) {
-            kepler_EACH_LANE
-            for (int lane = 0; lane < kepler_LANES; ++lane)
-                carry[i][lane] -= model->gain[i * 4 + j][lane] * model->residual[j][lane];
-        }
-    for (int i = 0; i < 4; ++i) {
-        kepler_EACH_LANE
-        for (int lane = 0; lane < kepler_LANES; ++lane) {
-            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
-            const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
-            x[i][lane] = sum + small;
-            carry[i][lane] = small - (x[i][lane] - sum);
-        }
-    }
 }
 
 /* One step of all members, of as many as remain. How many members are left. */

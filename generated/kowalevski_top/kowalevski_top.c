@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 5c16b4a73319eca9bf8ccac5c1c7cbf20a93540fbcda2d8cd6055adcd28f80ff
+ * body-sha256: a6a9b577af248045e15687ca52045ba28b59a7d29a3fc39e4db52981d6ea3eb6
  */
 #include "kowalevski_top.h"
 
@@ -1390,10 +1390,10 @@ typedef struct {
     kowalevski_top_lanes coef[1][172], weight[1][32][6];
 } kowalevski_top_table;
 
-/* A stage in all lanes, linearised around y: a residual r of alpha(y) = x takes inverse r from y and gain r from the
-   increment. */
+/* A stage in all lanes, linearised around y. */
 typedef struct {
     kowalevski_top_lanes y[6], displacement[6], increment[6], residual[6];
+    /* a residual r of alpha(y) = x takes inverse r from y, and gain r from the increment */
     kowalevski_top_lanes inverse[36], slope[36], gain[36];
 } kowalevski_top_model;
 
@@ -2815,6 +2815,27 @@ static int kowalevski_top_group_solve(kowalevski_top_group *group, int stage, ko
     return iterations;
 }
 
+/* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
+static void kowalevski_top_group_advance(kowalevski_top_lanes x[restrict 6], kowalevski_top_lanes carry[restrict 6],
+    kowalevski_top_model *model)
+{
+    for (int i = 0; i < 6; ++i)
+        for (int j = 0; j < 6; ++j) {
+            kowalevski_top_EACH_LANE
+            for (int lane = 0; lane < kowalevski_top_LANES; ++lane)
+                carry[i][lane] -= model->gain[i * 6 + j][lane] * model->residual[j][lane];
+        }
+    for (int i = 0; i < 6; ++i) {
+        kowalevski_top_EACH_LANE
+        for (int lane = 0; lane < kowalevski_top_LANES; ++lane) {
+            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
+            const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
+            x[i][lane] = sum + small;
+            carry[i][lane] = small - (x[i][lane] - sum);
+        }
+    }
+}
+
 /* Members that failed, or whose state is not finite, keep the state before the step, and leave. How many stay. */
 static int kowalevski_top_group_leave(kowalevski_top_group *group, kowalevski_top_lanes x[6], kowalevski_top_lanes carry[6],
     size_t remaining)
@@ -2836,27 +2857,6 @@ static int kowalevski_top_group_leave(kowalevski_top_group *group, kowalevski_to
         if (!group->active[lane] && group->left[lane] == 0) group->left[lane] = remaining;
     }
     return active;
-}
-
-/* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
-static void kowalevski_top_group_advance(kowalevski_top_lanes x[restrict 6], kowalevski_top_lanes carry[restrict 6],
-    kowalevski_top_model *model)
-{
-    for (int i = 0; i < 6; ++i)
-        for (int j = 0; j < 6; ++j) {
-            kowalevski_top_EACH_LANE
-            for (int lane = 0; lane < kowalevski_top_LANES; ++lane)
-                carry[i][lane] -= model->gain[i * 6 + j][lane] * model->residual[j][lane];
-        }
-    for (int i = 0; i < 6; ++i) {
-        kowalevski_top_EACH_LANE
-        for (int lane = 0; lane < kowalevski_top_LANES; ++lane) {
-            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
-            const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
-            x[i][lane] = sum + small;
-            carry[i][lane] = small - (x[i][lane] - sum);
-        }
-    }
 }
 
 /* One step of all members, of as many as remain. How many members are left. */

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: d74fc1b81784d865692398e508472657ceaf601bb91873f656273a6c1cef3ab4
+ * body-sha256: f4f729ba9c30fb58f218d53ca05eae8ed5c396aa1587bf18af2f723f0b0c7018
  */
 #include "lagrange_top.h"
 
@@ -984,10 +984,10 @@ typedef struct {
     lagrange_top_lanes coef[1][8], weight[1][32][6];
 } lagrange_top_table;
 
-/* A stage in all lanes, linearised around y: a residual r of alpha(y) = x takes inverse r from y and gain r from the
-   increment. */
+/* A stage in all lanes, linearised around y. */
 typedef struct {
     lagrange_top_lanes y[6], displacement[6], increment[6], residual[6];
+    /* a residual r of alpha(y) = x takes inverse r from y, and gain r from the increment */
     lagrange_top_lanes inverse[36], slope[36], gain[36];
 } lagrange_top_model;
 
@@ -2090,6 +2090,27 @@ static int lagrange_top_group_solve(lagrange_top_group *group, int stage, lagran
     return iterations;
 }
 
+/* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
+static void lagrange_top_group_advance(lagrange_top_lanes x[restrict 6], lagrange_top_lanes carry[restrict 6],
+    lagrange_top_model *model)
+{
+    for (int i = 0; i < 6; ++i)
+        for (int j = 0; j < 6; ++j) {
+            lagrange_top_EACH_LANE
+            for (int lane = 0; lane < lagrange_top_LANES; ++lane)
+                carry[i][lane] -= model->gain[i * 6 + j][lane] * model->residual[j][lane];
+        }
+    for (int i = 0; i < 6; ++i) {
+        lagrange_top_EACH_LANE
+        for (int lane = 0; lane < lagrange_top_LANES; ++lane) {
+            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
+            const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
+            x[i][lane] = sum + small;
+            carry[i][lane] = small - (x[i][lane] - sum);
+        }
+    }
+}
+
 /* Members that failed, or whose state is not finite, keep the state before the step, and leave. How many stay. */
 static int lagrange_top_group_leave(lagrange_top_group *group, lagrange_top_lanes x[6], lagrange_top_lanes carry[6],
     size_t remaining)
@@ -2111,27 +2132,6 @@ static int lagrange_top_group_leave(lagrange_top_group *group, lagrange_top_lane
         if (!group->active[lane] && group->left[lane] == 0) group->left[lane] = remaining;
     }
     return active;
-}
-
-/* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
-static void lagrange_top_group_advance(lagrange_top_lanes x[restrict 6], lagrange_top_lanes carry[restrict 6],
-    lagrange_top_model *model)
-{
-    for (int i = 0; i < 6; ++i)
-        for (int j = 0; j < 6; ++j) {
-            lagrange_top_EACH_LANE
-            for (int lane = 0; lane < lagrange_top_LANES; ++lane)
-                carry[i][lane] -= model->gain[i * 6 + j][lane] * model->residual[j][lane];
-        }
-    for (int i = 0; i < 6; ++i) {
-        lagrange_top_EACH_LANE
-        for (int lane = 0; lane < lagrange_top_LANES; ++lane) {
-            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
-            const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
-            x[i][lane] = sum + small;
-            carry[i][lane] = small - (x[i][lane] - sum);
-        }
-    }
 }
 
 /* One step of all members, of as many as remain. How many members are left. */

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 5a8cb69962f419ddaa7f441be62bc99e1b6926fa8244ebda91b0a9b22087884c
+ * body-sha256: 5d0aca4a92004b412b5378a0d5955f9758e7cba39cda67c9dde50e2520b5778b
  */
 #include "lotka_volterra.h"
 
@@ -500,10 +500,10 @@ typedef struct {
     lotka_volterra_lanes coef[1][1], weight[1][32][3];
 } lotka_volterra_table;
 
-/* A stage in all lanes, linearised around y: a residual r of alpha(y) = x takes inverse r from y and gain r from the
-   increment. */
+/* A stage in all lanes, linearised around y. */
 typedef struct {
     lotka_volterra_lanes y[3], displacement[3], increment[3], residual[3];
+    /* a residual r of alpha(y) = x takes inverse r from y, and gain r from the increment */
     lotka_volterra_lanes inverse[9], slope[9], gain[9];
 } lotka_volterra_model;
 
@@ -1187,6 +1187,27 @@ static int lotka_volterra_group_solve(lotka_volterra_group *group, int stage, lo
     return iterations;
 }
 
+/* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
+static void lotka_volterra_group_advance(lotka_volterra_lanes x[restrict 3], lotka_volterra_lanes carry[restrict 3],
+    lotka_volterra_model *model)
+{
+    for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j) {
+            lotka_volterra_EACH_LANE
+            for (int lane = 0; lane < lotka_volterra_LANES; ++lane)
+                carry[i][lane] -= model->gain[i * 3 + j][lane] * model->residual[j][lane];
+        }
+    for (int i = 0; i < 3; ++i) {
+        lotka_volterra_EACH_LANE
+        for (int lane = 0; lane < lotka_volterra_LANES; ++lane) {
+            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
+            const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
+            x[i][lane] = sum + small;
+            carry[i][lane] = small - (x[i][lane] - sum);
+        }
+    }
+}
+
 /* Members that failed, or whose state is not finite, keep the state before the step, and leave. How many stay. */
 static int lotka_volterra_group_leave(lotka_volterra_group *group, lotka_volterra_lanes x[3], lotka_volterra_lanes carry[3],
     size_t remaining)
@@ -1208,27 +1229,6 @@ static int lotka_volterra_group_leave(lotka_volterra_group *group, lotka_volterr
         if (!group->active[lane] && group->left[lane] == 0) group->left[lane] = remaining;
     }
     return active;
-}
-
-/* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
-static void lotka_volterra_group_advance(lotka_volterra_lanes x[restrict 3], lotka_volterra_lanes carry[restrict 3],
-    lotka_volterra_model *model)
-{
-    for (int i = 0; i < 3; ++i)
-        for (int j = 0; j < 3; ++j) {
-            lotka_volterra_EACH_LANE
-            for (int lane = 0; lane < lotka_volterra_LANES; ++lane)
-                carry[i][lane] -= model->gain[i * 3 + j][lane] * model->residual[j][lane];
-        }
-    for (int i = 0; i < 3; ++i) {
-        lotka_volterra_EACH_LANE
-        for (int lane = 0; lane < lotka_volterra_LANES; ++lane) {
-            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
-            const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
-            x[i][lane] = sum + small;
-            carry[i][lane] = small - (x[i][lane] - sum);
-        }
-    }
 }
 
 /* One step of all members, of as many as remain. How many members are left. */

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 80861574c4b1f7b51621a9bda850e66e2bde9abf04954e40ec83b2b98352cf51
+ * body-sha256: 1ecc5fcbfab32a94144d49c78b81335c3fb11e8e6c080abaff277d186a7edb08
  */
 #include "maxwell_bloch.h"
 
@@ -122,21 +122,20 @@ static void maxwell_bloch_eliminate(const double matrix[9], const double side[3]
                                     double reciprocal[restrict 3])
 {
     const double t1 = 1.0 / matrix[0];
-    const double t2 = matrix[6] * t1;
-    const double t3 = matrix[3] * t1;
-    const double t4 = side[1] - side[0] * t3;
-    const double t5 = 1.0 / (matrix[4] - matrix[1] * t3);
-    const double t6 = (matrix[7] - matrix[1] * t2) * t5;
-    const double t7 = matrix[5] - matrix[2] * t3;
-    const double t8 = 1.0 / (matrix[8] - matrix[2] * t2 - t7 * t6);
-    const double t9 = (side[2] - side[0] * t2 - t4 * t6) * t8;
-    const double t10 = t5 * (t4 - t7 * t9);
-    solution[0] = t1 * (side[0] - (matrix[2] * t9 + matrix[1] * t10));
-    solution[1] = t10;
-    solution[2] = t9;
+    const double t2 = matrix[3] * t1;
+    const double t3 = 1.0 / (matrix[4] - matrix[1] * t2);
+    const double t4 = side[1] - side[0] * t2;
+    const double t5 = matrix[6] * t1;
+    const double t6 = (matrix[7] - matrix[1] * t5) * t3;
+    const double t7 = 1.0 / (matrix[8] - matrix[5] * t6);
+    const double t8 = (side[2] - side[0] * t5 - t4 * t6) * t7;
+    const double t9 = t3 * (t4 - matrix[5] * t8);
+    solution[0] = t1 * (side[0] - matrix[1] * t9);
+    solution[1] = t9;
+    solution[2] = t8;
     reciprocal[0] = t1;
-    reciprocal[1] = t5;
-    reciprocal[2] = t8;
+    reciprocal[1] = t3;
+    reciprocal[2] = t7;
 }
 
 /* Solve matrix * solution = side, both overwritten. The matrix is I + O(h), so elimination without pivoting
@@ -490,10 +489,10 @@ typedef struct {
     maxwell_bloch_lanes coef[1][3], weight[1][32][3];
 } maxwell_bloch_table;
 
-/* A stage in all lanes, linearised around y: a residual r of alpha(y) = x takes inverse r from y and gain r from the
-   increment. */
+/* A stage in all lanes, linearised around y. */
 typedef struct {
     maxwell_bloch_lanes y[3], displacement[3], increment[3], residual[3];
+    /* a residual r of alpha(y) = x takes inverse r from y, and gain r from the increment */
     maxwell_bloch_lanes inverse[9], slope[9], gain[9];
 } maxwell_bloch_model;
 
@@ -1138,6 +1137,27 @@ static int maxwell_bloch_group_solve(maxwell_bloch_group *group, int stage, maxw
     return iterations;
 }
 
+/* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
+static void maxwell_bloch_group_advance(maxwell_bloch_lanes x[restrict 3], maxwell_bloch_lanes carry[restrict 3],
+    maxwell_bloch_model *model)
+{
+    for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j) {
+            maxwell_bloch_EACH_LANE
+            for (int lane = 0; lane < maxwell_bloch_LANES; ++lane)
+                carry[i][lane] -= model->gain[i * 3 + j][lane] * model->residual[j][lane];
+        }
+    for (int i = 0; i < 3; ++i) {
+        maxwell_bloch_EACH_LANE
+        for (int lane = 0; lane < maxwell_bloch_LANES; ++lane) {
+            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
+            const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
+            x[i][lane] = sum + small;
+            carry[i][lane] = small - (x[i][lane] - sum);
+        }
+    }
+}
+
 /* Members that failed, or whose state is not finite, keep the state before the step, and leave. How many stay. */
 static int maxwell_bloch_group_leave(maxwell_bloch_group *group, maxwell_bloch_lanes x[3], maxwell_bloch_lanes carry[3],
     size_t remaining)
@@ -1159,27 +1179,6 @@ static int maxwell_bloch_group_leave(maxwell_bloch_group *group, maxwell_bloch_l
         if (!group->active[lane] && group->left[lane] == 0) group->left[lane] = remaining;
     }
     return active;
-}
-
-/* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
-static void maxwell_bloch_group_advance(maxwell_bloch_lanes x[restrict 3], maxwell_bloch_lanes carry[restrict 3],
-    maxwell_bloch_model *model)
-{
-    for (int i = 0; i < 3; ++i)
-        for (int j = 0; j < 3; ++j) {
-            maxwell_bloch_EACH_LANE
-            for (int lane = 0; lane < maxwell_bloch_LANES; ++lane)
-                carry[i][lane] -= model->gain[i * 3 + j][lane] * model->residual[j][lane];
-        }
-    for (int i = 0; i < 3; ++i) {
-        maxwell_bloch_EACH_LANE
-        for (int lane = 0; lane < maxwell_bloch_LANES; ++lane) {
-            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
-            const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
-            x[i][lane] = sum + small;
-            carry[i][lane] = small - (x[i][lane] - sum);
-        }
-    }
 }
 
 /* One step of all members, of as many as remain. How many members are left. */

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: a226fa7727f2b7058114da2097481acf3f3342fc3641617296fc2b77ecbceb0b
+ * body-sha256: 17962570e26270f7039f53530ac65056067975aee9c68bf7182f753e35c3ca0e
  */
 #include "nambu_pendulum.h"
 
@@ -580,10 +580,10 @@ typedef struct {
     nambu_pendulum_lanes coef[1][3], weight[1][32][3];
 } nambu_pendulum_table;
 
-/* A stage in all lanes, linearised around y: a residual r of alpha(y) = x takes inverse r from y and gain r from the
-   increment. */
+/* A stage in all lanes, linearised around y. */
 typedef struct {
     nambu_pendulum_lanes y[3], displacement[3], increment[3], residual[3];
+    /* a residual r of alpha(y) = x takes inverse r from y, and gain r from the increment */
     nambu_pendulum_lanes inverse[9], slope[9], gain[9];
     nambu_pendulum_lanes middle[3]; /* of the path, less y */
     nambu_pendulum_lanes alpha_y[9], increment_y[9]; /* of alpha and beta - alpha, with p held fixed */
@@ -1790,6 +1790,27 @@ static int nambu_pendulum_group_solve(nambu_pendulum_group *group, int stage, na
     return iterations;
 }
 
+/* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
+static void nambu_pendulum_group_advance(nambu_pendulum_lanes x[restrict 3], nambu_pendulum_lanes carry[restrict 3],
+    nambu_pendulum_model *model)
+{
+    for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j) {
+            nambu_pendulum_EACH_LANE
+            for (int lane = 0; lane < nambu_pendulum_LANES; ++lane)
+                carry[i][lane] -= model->gain[i * 3 + j][lane] * model->residual[j][lane];
+        }
+    for (int i = 0; i < 3; ++i) {
+        nambu_pendulum_EACH_LANE
+        for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) {
+            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
+            const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
+            x[i][lane] = sum + small;
+            carry[i][lane] = small - (x[i][lane] - sum);
+        }
+    }
+}
+
 /* Members that failed, or whose state is not finite, keep the state before the step, and leave. How many stay. */
 static int nambu_pendulum_group_leave(nambu_pendulum_group *group, nambu_pendulum_lanes x[3], nambu_pendulum_lanes carry[3],
     size_t remaining)
@@ -1811,27 +1832,6 @@ static int nambu_pendulum_group_leave(nambu_pendulum_group *group, nambu_pendulu
         if (!group->active[lane] && group->left[lane] == 0) group->left[lane] = remaining;
     }
     return active;
-}
-
-/* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
-static void nambu_pendulum_group_advance(nambu_pendulum_lanes x[restrict 3], nambu_pendulum_lanes carry[restrict 3],
-    nambu_pendulum_model *model)
-{
-    for (int i = 0; i < 3; ++i)
-        for (int j = 0; j < 3; ++j) {
-            nambu_pendulum_EACH_LANE
-            for (int lane = 0; lane < nambu_pendulum_LANES; ++lane)
-                carry[i][lane] -= model->gain[i * 3 + j][lane] * model->residual[j][lane];
-        }
-    for (int i = 0; i < 3; ++i) {
-        nambu_pendulum_EACH_LANE
-        for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) {
-            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
-            const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
-            x[i][lane] = sum + small;
-            carry[i][lane] = small - (x[i][lane] - sum);
-        }
-    }
 }
 
 /* One step of all members, of as many as remain. How many members are left. */

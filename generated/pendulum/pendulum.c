@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 88fc5ef2cb9bb60304d82f04b1f58d102a1a3c130bf4fee9c6cba38608063ac3
+ * body-sha256: d411923ad09c16af4b5aa70bec17759d8ef97edb169627ac51a029e79421b84c
  */
 #include "pendulum.h"
 
@@ -494,10 +494,10 @@ typedef struct {
     pendulum_lanes coef[1][19], weight[1][32][2];
 } pendulum_table;
 
-/* A stage in all lanes, linearised around y: a residual r of alpha(y) = x takes inverse r from y and gain r from the
-   increment. */
+/* A stage in all lanes, linearised around y. */
 typedef struct {
     pendulum_lanes y[2], displacement[2], increment[2], residual[2];
+    /* a residual r of alpha(y) = x takes inverse r from y, and gain r from the increment */
     pendulum_lanes inverse[4], slope[4], gain[4];
 } pendulum_model;
 
@@ -1149,6 +1149,27 @@ static int pendulum_group_solve(pendulum_group *group, int stage, pendulum_model
     return iterations;
 }
 
+/* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
+static void pendulum_group_advance(pendulum_lanes x[restrict 2], pendulum_lanes carry[restrict 2],
+    pendulum_model *model)
+{
+    for (int i = 0; i < 2; ++i)
+        for (int j = 0; j < 2; ++j) {
+            pendulum_EACH_LANE
+            for (int lane = 0; lane < pendulum_LANES; ++lane)
+                carry[i][lane] -= model->gain[i * 2 + j][lane] * model->residual[j][lane];
+        }
+    for (int i = 0; i < 2; ++i) {
+        pendulum_EACH_LANE
+        for (int lane = 0; lane < pendulum_LANES; ++lane) {
+            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
+            const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
+            x[i][lane] = sum + small;
+            carry[i][lane] = small - (x[i][lane] - sum);
+        }
+    }
+}
+
 /* Members that failed, or whose state is not finite, keep the state before the step, and leave. How many stay. */
 static int pendulum_group_leave(pendulum_group *group, pendulum_lanes x[2], pendulum_lanes carry[2],
     size_t remaining)
@@ -1170,27 +1191,6 @@ static int pendulum_group_leave(pendulum_group *group, pendulum_lanes x[2], pend
         if (!group->active[lane] && group->left[lane] == 0) group->left[lane] = remaining;
     }
     return active;
-}
-
-/* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
-static void pendulum_group_advance(pendulum_lanes x[restrict 2], pendulum_lanes carry[restrict 2],
-    pendulum_model *model)
-{
-    for (int i = 0; i < 2; ++i)
-        for (int j = 0; j < 2; ++j) {
-            pendulum_EACH_LANE
-            for (int lane = 0; lane < pendulum_LANES; ++lane)
-                carry[i][lane] -= model->gain[i * 2 + j][lane] * model->residual[j][lane];
-        }
-    for (int i = 0; i < 2; ++i) {
-        pendulum_EACH_LANE
-        for (int lane = 0; lane < pendulum_LANES; ++lane) {
-            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
-            const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
-            x[i][lane] = sum + small;
-            carry[i][lane] = small - (x[i][lane] - sum);
-        }
-    }
 }
 
 /* One step of all members, of as many as remain. How many members are left. */

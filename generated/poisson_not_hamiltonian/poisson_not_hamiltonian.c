@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 8d871e2a03d9b99b18bb3a0cef129c95462da693abe1c28db41b6b0848316025
+ * body-sha256: dae80007921e85353c2513595caaa865314e12ce0b6a64f823cfcd701e63c4fb
  */
 #include "poisson_not_hamiltonian.h"
 
@@ -599,10 +599,10 @@ typedef struct {
     poisson_not_hamiltonian_lanes coef[1][2], weight[1][32][3];
 } poisson_not_hamiltonian_table;
 
-/* A stage in all lanes, linearised around y: a residual r of alpha(y) = x takes inverse r from y and gain r from the
-   increment. */
+/* A stage in all lanes, linearised around y. */
 typedef struct {
     poisson_not_hamiltonian_lanes y[3], displacement[3], increment[3], residual[3];
+    /* a residual r of alpha(y) = x takes inverse r from y, and gain r from the increment */
     poisson_not_hamiltonian_lanes inverse[9], slope[9], gain[9];
 } poisson_not_hamiltonian_model;
 
@@ -1449,6 +1449,27 @@ static int poisson_not_hamiltonian_group_solve(poisson_not_hamiltonian_group *gr
     return iterations;
 }
 
+/* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
+static void poisson_not_hamiltonian_group_advance(poisson_not_hamiltonian_lanes x[restrict 3], poisson_not_hamiltonian_lanes carry[restrict 3],
+    poisson_not_hamiltonian_model *model)
+{
+    for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j) {
+            poisson_not_hamiltonian_EACH_LANE
+            for (int lane = 0; lane < poisson_not_hamiltonian_LANES; ++lane)
+                carry[i][lane] -= model->gain[i * 3 + j][lane] * model->residual[j][lane];
+        }
+    for (int i = 0; i < 3; ++i) {
+        poisson_not_hamiltonian_EACH_LANE
+        for (int lane = 0; lane < poisson_not_hamiltonian_LANES; ++lane) {
+            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
+            const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
+            x[i][lane] = sum + small;
+            carry[i][lane] = small - (x[i][lane] - sum);
+        }
+    }
+}
+
 /* Members that failed, or whose state is not finite, keep the state before the step, and leave. How many stay. */
 static int poisson_not_hamiltonian_group_leave(poisson_not_hamiltonian_group *group, poisson_not_hamiltonian_lanes x[3], poisson_not_hamiltonian_lanes carry[3],
     size_t remaining)
@@ -1470,27 +1491,6 @@ static int poisson_not_hamiltonian_group_leave(poisson_not_hamiltonian_group *gr
         if (!group->active[lane] && group->left[lane] == 0) group->left[lane] = remaining;
     }
     return active;
-}
-
-/* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
-static void poisson_not_hamiltonian_group_advance(poisson_not_hamiltonian_lanes x[restrict 3], poisson_not_hamiltonian_lanes carry[restrict 3],
-    poisson_not_hamiltonian_model *model)
-{
-    for (int i = 0; i < 3; ++i)
-        for (int j = 0; j < 3; ++j) {
-            poisson_not_hamiltonian_EACH_LANE
-            for (int lane = 0; lane < poisson_not_hamiltonian_LANES; ++lane)
-                carry[i][lane] -= model->gain[i * 3 + j][lane] * model->residual[j][lane];
-        }
-    for (int i = 0; i < 3; ++i) {
-        poisson_not_hamiltonian_EACH_LANE
-        for (int lane = 0; lane < poisson_not_hamiltonian_LANES; ++lane) {
-            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
-            const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
-            x[i][lane] = sum + small;
-            carry[i][lane] = small - (x[i][lane] - sum);
-        }
-    }
 }
 
 /* One step of all members, of as many as remain. How many members are left. */

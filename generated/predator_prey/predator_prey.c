@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 2253685d439dff14afadabbeaa1ac8591e41e75dd054a48c4851cd612f9d2c4d
+ * body-sha256: 7d2c81d6a7cd9c92f87f9464543fe5b4f02fc0b04022f514e0f77b1a72c0b06b
  */
 #include "predator_prey.h"
 
@@ -495,10 +495,10 @@ typedef struct {
     predator_prey_lanes coef[1][11], weight[1][32][2];
 } predator_prey_table;
 
-/* A stage in all lanes, linearised around y: a residual r of alpha(y) = x takes inverse r from y and gain r from the
-   increment. */
+/* A stage in all lanes, linearised around y. */
 typedef struct {
     predator_prey_lanes y[2], displacement[2], increment[2], residual[2];
+    /* a residual r of alpha(y) = x takes inverse r from y, and gain r from the increment */
     predator_prey_lanes inverse[4], slope[4], gain[4];
 } predator_prey_model;
 
@@ -1143,6 +1143,27 @@ static int predator_prey_group_solve(predator_prey_group *group, int stage, pred
     return iterations;
 }
 
+/* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
+static void predator_prey_group_advance(predator_prey_lanes x[restrict 2], predator_prey_lanes carry[restrict 2],
+    predator_prey_model *model)
+{
+    for (int i = 0; i < 2; ++i)
+        for (int j = 0; j < 2; ++j) {
+            predator_prey_EACH_LANE
+            for (int lane = 0; lane < predator_prey_LANES; ++lane)
+                carry[i][lane] -= model->gain[i * 2 + j][lane] * model->residual[j][lane];
+        }
+    for (int i = 0; i < 2; ++i) {
+        predator_prey_EACH_LANE
+        for (int lane = 0; lane < predator_prey_LANES; ++lane) {
+            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
+            const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
+            x[i][lane] = sum + small;
+            carry[i][lane] = small - (x[i][lane] - sum);
+        }
+    }
+}
+
 /* Members that failed, or whose state is not finite, keep the state before the step, and leave. How many stay. */
 static int predator_prey_group_leave(predator_prey_group *group, predator_prey_lanes x[2], predator_prey_lanes carry[2],
     size_t remaining)
@@ -1164,27 +1185,6 @@ static int predator_prey_group_leave(predator_prey_group *group, predator_prey_l
         if (!group->active[lane] && group->left[lane] == 0) group->left[lane] = remaining;
     }
     return active;
-}
-
-/* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
-static void predator_prey_group_advance(predator_prey_lanes x[restrict 2], predator_prey_lanes carry[restrict 2],
-    predator_prey_model *model)
-{
-    for (int i = 0; i < 2; ++i)
-        for (int j = 0; j < 2; ++j) {
-            predator_prey_EACH_LANE
-            for (int lane = 0; lane < predator_prey_LANES; ++lane)
-                carry[i][lane] -= model->gain[i * 2 + j][lane] * model->residual[j][lane];
-        }
-    for (int i = 0; i < 2; ++i) {
-        predator_prey_EACH_LANE
-        for (int lane = 0; lane < predator_prey_LANES; ++lane) {
-            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
-            const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
-            x[i][lane] = sum + small;
-            carry[i][lane] = small - (x[i][lane] - sum);
-        }
-    }
 }
 
 /* One step of all members, of as many as remain. How many members are left. */

@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 1367acd05755d45c997bd2a9f7f646eb603337a478903090b559877323ff098d
+ * body-sha256: 3f6868f0dc162f31cbe67fc1ac178fb56f0fd65c7c83d59e39a4818adfafc1bf
  */
 #include "rigid_body.h"
 
@@ -934,10 +934,10 @@ typedef struct {
     rigid_body_lanes coef[1][35], weight[1][32][3];
 } rigid_body_table;
 
-/* A stage in all lanes, linearised around y: a residual r of alpha(y) = x takes inverse r from y and gain r from the
-   increment. */
+/* A stage in all lanes, linearised around y. */
 typedef struct {
     rigid_body_lanes y[3], displacement[3], increment[3], residual[3];
+    /* a residual r of alpha(y) = x takes inverse r from y, and gain r from the increment */
     rigid_body_lanes inverse[9], slope[9], gain[9];
 } rigid_body_model;
 
@@ -1682,6 +1682,27 @@ static int rigid_body_group_solve(rigid_body_group *group, int stage, rigid_body
     return iterations;
 }
 
+/* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
+static void rigid_body_group_advance(rigid_body_lanes x[restrict 3], rigid_body_lanes carry[restrict 3],
+    rigid_body_model *model)
+{
+    for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j) {
+            rigid_body_EACH_LANE
+            for (int lane = 0; lane < rigid_body_LANES; ++lane)
+                carry[i][lane] -= model->gain[i * 3 + j][lane] * model->residual[j][lane];
+        }
+    for (int i = 0; i < 3; ++i) {
+        rigid_body_EACH_LANE
+        for (int lane = 0; lane < rigid_body_LANES; ++lane) {
+            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
+            const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
+            x[i][lane] = sum + small;
+            carry[i][lane] = small - (x[i][lane] - sum);
+        }
+    }
+}
+
 /* Members that failed, or whose state is not finite, keep the state before the step, and leave. How many stay. */
 static int rigid_body_group_leave(rigid_body_group *group, rigid_body_lanes x[3], rigid_body_lanes carry[3],
     size_t remaining)
@@ -1703,27 +1724,6 @@ static int rigid_body_group_leave(rigid_body_group *group, rigid_body_lanes x[3]
         if (!group->active[lane] && group->left[lane] == 0) group->left[lane] = remaining;
     }
     return active;
-}
-
-/* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
-static void rigid_body_group_advance(rigid_body_lanes x[restrict 3], rigid_body_lanes carry[restrict 3],
-    rigid_body_model *model)
-{
-    for (int i = 0; i < 3; ++i)
-        for (int j = 0; j < 3; ++j) {
-            rigid_body_EACH_LANE
-            for (int lane = 0; lane < rigid_body_LANES; ++lane)
-                carry[i][lane] -= model->gain[i * 3 + j][lane] * model->residual[j][lane];
-        }
-    for (int i = 0; i < 3; ++i) {
-        rigid_body_EACH_LANE
-        for (int lane = 0; lane < rigid_body_LANES; ++lane) {
-            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
-            const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
-            x[i][lane] = sum + small;
-            carry[i][lane] = small - (x[i][lane] - sum);
-        }
-    }
 }
 
 /* One step of all members, of as many as remain. How many members are left. */

@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: de9a94db1f39354a5e7b0e689ae62282735050d2312bc56980708373e48573a7
+ * body-sha256: 9ee1c4c34801c673cb5c986e556d7bea1b261261d817788763933d7999441503
  */
 #include "rigid_body_dual.h"
 
@@ -828,10 +828,10 @@ typedef struct {
     rigid_body_dual_lanes coef[1][12], weight[1][32][3];
 } rigid_body_dual_table;
 
-/* A stage in all lanes, linearised around y: a residual r of alpha(y) = x takes inverse r from y and gain r from the
-   increment. */
+/* A stage in all lanes, linearised around y. */
 typedef struct {
     rigid_body_dual_lanes y[3], displacement[3], increment[3], residual[3];
+    /* a residual r of alpha(y) = x takes inverse r from y, and gain r from the increment */
     rigid_body_dual_lanes inverse[9], slope[9], gain[9];
 } rigid_body_dual_model;
 
@@ -1582,6 +1582,27 @@ static int rigid_body_dual_group_solve(rigid_body_dual_group *group, int stage, 
     return iterations;
 }
 
+/* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
+static void rigid_body_dual_group_advance(rigid_body_dual_lanes x[restrict 3], rigid_body_dual_lanes carry[restrict 3],
+    rigid_body_dual_model *model)
+{
+    for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j) {
+            rigid_body_dual_EACH_LANE
+            for (int lane = 0; lane < rigid_body_dual_LANES; ++lane)
+                carry[i][lane] -= model->gain[i * 3 + j][lane] * model->residual[j][lane];
+        }
+    for (int i = 0; i < 3; ++i) {
+        rigid_body_dual_EACH_LANE
+        for (int lane = 0; lane < rigid_body_dual_LANES; ++lane) {
+            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
+            const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
+            x[i][lane] = sum + small;
+            carry[i][lane] = small - (x[i][lane] - sum);
+        }
+    }
+}
+
 /* Members that failed, or whose state is not finite, keep the state before the step, and leave. How many stay. */
 static int rigid_body_dual_group_leave(rigid_body_dual_group *group, rigid_body_dual_lanes x[3], rigid_body_dual_lanes carry[3],
     size_t remaining)
@@ -1603,27 +1624,6 @@ static int rigid_body_dual_group_leave(rigid_body_dual_group *group, rigid_body_
         if (!group->active[lane] && group->left[lane] == 0) group->left[lane] = remaining;
     }
     return active;
-}
-
-/* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
-static void rigid_body_dual_group_advance(rigid_body_dual_lanes x[restrict 3], rigid_body_dual_lanes carry[restrict 3],
-    rigid_body_dual_model *model)
-{
-    for (int i = 0; i < 3; ++i)
-        for (int j = 0; j < 3; ++j) {
-            rigid_body_dual_EACH_LANE
-            for (int lane = 0; lane < rigid_body_dual_LANES; ++lane)
-                carry[i][lane] -= model->gain[i * 3 + j][lane] * model->residual[j][lane];
-        }
-    for (int i = 0; i < 3; ++i) {
-        rigid_body_dual_EACH_LANE
-        for (int lane = 0; lane < rigid_body_dual_LANES; ++lane) {
-            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
-            const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
-            x[i][lane] = sum + small;
-            carry[i][lane] = small - (x[i][lane] - sum);
-        }
-    }
 }
 
 /* One step of all members, of as many as remain. How many members are left. */

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: b41b83e589a1e6da1561005d84a2389ae01fe72c774a1896945099092f78c0f6
+ * body-sha256: f0acab5958abaf1de19794a6b8d997a60eb0073a972239a250a79a59317019a3
  */
 #include "rigid_body_paper.h"
 
@@ -605,10 +605,10 @@ typedef struct {
     rigid_body_paper_lanes coef[1][3], weight[1][32][3];
 } rigid_body_paper_table;
 
-/* A stage in all lanes, linearised around y: a residual r of alpha(y) = x takes inverse r from y and gain r from the
-   increment. */
+/* A stage in all lanes, linearised around y. */
 typedef struct {
     rigid_body_paper_lanes y[3], displacement[3], increment[3], residual[3];
+    /* a residual r of alpha(y) = x takes inverse r from y, and gain r from the increment */
     rigid_body_paper_lanes inverse[9], slope[9], gain[9];
 } rigid_body_paper_model;
 
@@ -1323,6 +1323,27 @@ static int rigid_body_paper_group_solve(rigid_body_paper_group *group, int stage
     return iterations;
 }
 
+/* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
+static void rigid_body_paper_group_advance(rigid_body_paper_lanes x[restrict 3], rigid_body_paper_lanes carry[restrict 3],
+    rigid_body_paper_model *model)
+{
+    for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j) {
+            rigid_body_paper_EACH_LANE
+            for (int lane = 0; lane < rigid_body_paper_LANES; ++lane)
+                carry[i][lane] -= model->gain[i * 3 + j][lane] * model->residual[j][lane];
+        }
+    for (int i = 0; i < 3; ++i) {
+        rigid_body_paper_EACH_LANE
+        for (int lane = 0; lane < rigid_body_paper_LANES; ++lane) {
+            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
+            const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
+            x[i][lane] = sum + small;
+            carry[i][lane] = small - (x[i][lane] - sum);
+        }
+    }
+}
+
 /* Members that failed, or whose state is not finite, keep the state before the step, and leave. How many stay. */
 static int rigid_body_paper_group_leave(rigid_body_paper_group *group, rigid_body_paper_lanes x[3], rigid_body_paper_lanes carry[3],
     size_t remaining)
@@ -1344,27 +1365,6 @@ static int rigid_body_paper_group_leave(rigid_body_paper_group *group, rigid_bod
         if (!group->active[lane] && group->left[lane] == 0) group->left[lane] = remaining;
     }
     return active;
-}
-
-/* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
-static void rigid_body_paper_group_advance(rigid_body_paper_lanes x[restrict 3], rigid_body_paper_lanes carry[restrict 3],
-    rigid_body_paper_model *model)
-{
-    for (int i = 0; i < 3; ++i)
-        for (int j = 0; j < 3; ++j) {
-            rigid_body_paper_EACH_LANE
-            for (int lane = 0; lane < rigid_body_paper_LANES; ++lane)
-                carry[i][lane] -= model->gain[i * 3 + j][lane] * model->residual[j][lane];
-        }
-    for (int i = 0; i < 3; ++i) {
-        rigid_body_paper_EACH_LANE
-        for (int lane = 0; lane < rigid_body_paper_LANES; ++lane) {
-            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
-            const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
-            x[i][lane] = sum + small;
-            carry[i][lane] = small - (x[i][lane] - sum);
-        }
-    }
 }
 
 /* One step of all members, of as many as remain. How many members are left. */

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 4fb096630d414f2b323f849f6742817bb090f0e39d58796834f417ef3fe008a0
+ * body-sha256: dacb3965efdea6ce7541517ed1f43c7cc2863725e6a974481a45a753f55aab5c
  */
 #include "sir_epidemic.h"
 
@@ -580,10 +580,10 @@ typedef struct {
     sir_epidemic_lanes coef[1][4], weight[1][32][3];
 } sir_epidemic_table;
 
-/* A stage in all lanes, linearised around y: a residual r of alpha(y) = x takes inverse r from y and gain r from the
-   increment. */
+/* A stage in all lanes, linearised around y. */
 typedef struct {
     sir_epidemic_lanes y[3], displacement[3], increment[3], residual[3];
+    /* a residual r of alpha(y) = x takes inverse r from y, and gain r from the increment */
     sir_epidemic_lanes inverse[9], slope[9], gain[9];
     sir_epidemic_lanes middle[3]; /* of the path, less y */
     sir_epidemic_lanes alpha_y[9], increment_y[9]; /* of alpha and beta - alpha, with p held fixed */
@@ -1770,6 +1770,27 @@ static int sir_epidemic_group_solve(sir_epidemic_group *group, int stage, sir_ep
     return iterations;
 }
 
+/* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
+static void sir_epidemic_group_advance(sir_epidemic_lanes x[restrict 3], sir_epidemic_lanes carry[restrict 3],
+    sir_epidemic_model *model)
+{
+    for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j) {
+            sir_epidemic_EACH_LANE
+            for (int lane = 0; lane < sir_epidemic_LANES; ++lane)
+                carry[i][lane] -= model->gain[i * 3 + j][lane] * model->residual[j][lane];
+        }
+    for (int i = 0; i < 3; ++i) {
+        sir_epidemic_EACH_LANE
+        for (int lane = 0; lane < sir_epidemic_LANES; ++lane) {
+            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
+            const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
+            x[i][lane] = sum + small;
+            carry[i][lane] = small - (x[i][lane] - sum);
+        }
+    }
+}
+
 /* Members that failed, or whose state is not finite, keep the state before the step, and leave. How many stay. */
 static int sir_epidemic_group_leave(sir_epidemic_group *group, sir_epidemic_lanes x[3], sir_epidemic_lanes carry[3],
     size_t remaining)
@@ -1791,27 +1812,6 @@ static int sir_epidemic_group_leave(sir_epidemic_group *group, sir_epidemic_lane
         if (!group->active[lane] && group->left[lane] == 0) group->left[lane] = remaining;
     }
     return active;
-}
-
-/* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
-static void sir_epidemic_group_advance(sir_epidemic_lanes x[restrict 3], sir_epidemic_lanes carry[restrict 3],
-    sir_epidemic_model *model)
-{
-    for (int i = 0; i < 3; ++i)
-        for (int j = 0; j < 3; ++j) {
-            sir_epidemic_EACH_LANE
-            for (int lane = 0; lane < sir_epidemic_LANES; ++lane)
-                carry[i][lane] -= model->gain[i * 3 + j][lane] * model->residual[j][lane];
-        }
-    for (int i = 0; i < 3; ++i) {
-        sir_epidemic_EACH_LANE
-        for (int lane = 0; lane < sir_epidemic_LANES; ++lane) {
-            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
-            const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
-            x[i][lane] = sum + small;
-            carry[i][lane] = small - (x[i][lane] - sum);
-        }
-    }
 }
 
 /* One step of all members, of as many as remain. How many members are left. */

@@ -12,7 +12,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 347dc93da96115c7be6df4d8ce5b4c1e67c23ad84b983fb7e59d80da648b30b9
+ * body-sha256: 46d285d7f7f451a26f084369607f29907088b49e291002dfd8737903dc9caa69
  */
 #include "sir_final_size.h"
 
@@ -582,10 +582,10 @@ typedef struct {
     sir_final_size_lanes coef[1][3], weight[1][32][3];
 } sir_final_size_table;
 
-/* A stage in all lanes, linearised around y: a residual r of alpha(y) = x takes inverse r from y and gain r from the
-   increment. */
+/* A stage in all lanes, linearised around y. */
 typedef struct {
     sir_final_size_lanes y[3], displacement[3], increment[3], residual[3];
+    /* a residual r of alpha(y) = x takes inverse r from y, and gain r from the increment */
     sir_final_size_lanes inverse[9], slope[9], gain[9];
     sir_final_size_lanes middle[3]; /* of the path, less y */
     sir_final_size_lanes alpha_y[9], increment_y[9]; /* of alpha and beta - alpha, with p held fixed */
@@ -1785,6 +1785,27 @@ static int sir_final_size_group_solve(sir_final_size_group *group, int stage, si
     return iterations;
 }
 
+/* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
+static void sir_final_size_group_advance(sir_final_size_lanes x[restrict 3], sir_final_size_lanes carry[restrict 3],
+    sir_final_size_model *model)
+{
+    for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j) {
+            sir_final_size_EACH_LANE
+            for (int lane = 0; lane < sir_final_size_LANES; ++lane)
+                carry[i][lane] -= model->gain[i * 3 + j][lane] * model->residual[j][lane];
+        }
+    for (int i = 0; i < 3; ++i) {
+        sir_final_size_EACH_LANE
+        for (int lane = 0; lane < sir_final_size_LANES; ++lane) {
+            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
+            const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
+            x[i][lane] = sum + small;
+            carry[i][lane] = small - (x[i][lane] - sum);
+        }
+    }
+}
+
 /* Members that failed, or whose state is not finite, keep the state before the step, and leave. How many stay. */
 static int sir_final_size_group_leave(sir_final_size_group *group, sir_final_size_lanes x[3], sir_final_size_lanes carry[3],
     size_t remaining)
@@ -1806,27 +1827,6 @@ static int sir_final_size_group_leave(sir_final_size_group *group, sir_final_siz
         if (!group->active[lane] && group->left[lane] == 0) group->left[lane] = remaining;
     }
     return active;
-}
-
-/* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
-static void sir_final_size_group_advance(sir_final_size_lanes x[restrict 3], sir_final_size_lanes carry[restrict 3],
-    sir_final_size_model *model)
-{
-    for (int i = 0; i < 3; ++i)
-        for (int j = 0; j < 3; ++j) {
-            sir_final_size_EACH_LANE
-            for (int lane = 0; lane < sir_final_size_LANES; ++lane)
-                carry[i][lane] -= model->gain[i * 3 + j][lane] * model->residual[j][lane];
-        }
-    for (int i = 0; i < 3; ++i) {
-        sir_final_size_EACH_LANE
-        for (int lane = 0; lane < sir_final_size_LANES; ++lane) {
-            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
-            const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
-            x[i][lane] = sum + small;
-            carry[i][lane] = small - (x[i][lane] - sum);
-        }
-    }
 }
 
 /* One step of all members, of as many as remain. How many members are left. */

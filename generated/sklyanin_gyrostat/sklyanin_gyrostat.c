@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: b034b2a0cdfd95f9a490649ac7b02d53a45787dd865708563a45f1118e871879
+ * body-sha256: eaba2cc7873b034c1e8d0d50ba0adcb36ff0f2bef0e47356eab3a02e75ab212f
  */
 #include "sklyanin_gyrostat.h"
 
@@ -939,10 +939,10 @@ typedef struct {
     sklyanin_gyrostat_lanes coef[1][31], weight[1][32][4];
 } sklyanin_gyrostat_table;
 
-/* A stage in all lanes, linearised around y: a residual r of alpha(y) = x takes inverse r from y and gain r from the
-   increment. */
+/* A stage in all lanes, linearised around y. */
 typedef struct {
     sklyanin_gyrostat_lanes y[4], displacement[4], increment[4], residual[4];
+    /* a residual r of alpha(y) = x takes inverse r from y, and gain r from the increment */
     sklyanin_gyrostat_lanes inverse[16], slope[16], gain[16];
     sklyanin_gyrostat_lanes middle[4]; /* of the path, less y */
     sklyanin_gyrostat_lanes alpha_y[16], increment_y[16]; /* of alpha and beta - alpha, with p held fixed */
@@ -2528,6 +2528,27 @@ static int sklyanin_gyrostat_group_solve(sklyanin_gyrostat_group *group, int sta
     return iterations;
 }
 
+/* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
+static void sklyanin_gyrostat_group_advance(sklyanin_gyrostat_lanes x[restrict 4], sklyanin_gyrostat_lanes carry[restrict 4],
+    sklyanin_gyrostat_model *model)
+{
+    for (int i = 0; i < 4; ++i)
+        for (int j = 0; j < 4; ++j) {
+            sklyanin_gyrostat_EACH_LANE
+            for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane)
+                carry[i][lane] -= model->gain[i * 4 + j][lane] * model->residual[j][lane];
+        }
+    for (int i = 0; i < 4; ++i) {
+        sklyanin_gyrostat_EACH_LANE
+        for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) {
+            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
+            const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
+            x[i][lane] = sum + small;
+            carry[i][lane] = small - (x[i][lane] - sum);
+        }
+    }
+}
+
 /* Members that failed, or whose state is not finite, keep the state before the step, and leave. How many stay. */
 static int sklyanin_gyrostat_group_leave(sklyanin_gyrostat_group *group, sklyanin_gyrostat_lanes x[4], sklyanin_gyrostat_lanes carry[4],
     size_t remaining)
@@ -2549,27 +2570,6 @@ static int sklyanin_gyrostat_group_leave(sklyanin_gyrostat_group *group, sklyani
         if (!group->active[lane] && group->left[lane] == 0) group->left[lane] = remaining;
     }
     return active;
-}
-
-/* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
-static void sklyanin_gyrostat_group_advance(sklyanin_gyrostat_lanes x[restrict 4], sklyanin_gyrostat_lanes carry[restrict 4],
-    sklyanin_gyrostat_model *model)
-{
-    for (int i = 0; i < 4; ++i)
-        for (int j = 0; j < 4; ++j) {
-            sklyanin_gyrostat_EACH_LANE
-            for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane)
-                carry[i][lane] -= model->gain[i * 4 + j][lane] * model->residual[j][lane];
-        }
-    for (int i = 0; i < 4; ++i) {
-        sklyanin_gyrostat_EACH_LANE
-        for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) {
-            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
-            const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
-            x[i][lane] = sum + small;
-            carry[i][lane] = small - (x[i][lane] - sum);
-        }
-    }
 }
 
 /* One step of all members, of as many as remain. How many members are left. */

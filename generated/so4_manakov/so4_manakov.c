@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: e9497865f372c6d90efcb7db6d494c8d58cf443e86c2be337b1b74a205c85878
+ * body-sha256: e76d9d4d6c1b260412e03f32c8134a27f954751dbad9c487eae5003c876ad80a
  */
 #include "so4_manakov.h"
 
@@ -1253,10 +1253,10 @@ typedef struct {
     so4_manakov_lanes coef[1][32], weight[1][32][6];
 } so4_manakov_table;
 
-/* A stage in all lanes, linearised around y: a residual r of alpha(y) = x takes inverse r from y and gain r from the
-   increment. */
+/* A stage in all lanes, linearised around y. */
 typedef struct {
     so4_manakov_lanes y[6], displacement[6], increment[6], residual[6];
+    /* a residual r of alpha(y) = x takes inverse r from y, and gain r from the increment */
     so4_manakov_lanes inverse[36], slope[36], gain[36];
 } so4_manakov_model;
 
@@ -2487,6 +2487,27 @@ static int so4_manakov_group_solve(so4_manakov_group *group, int stage, so4_mana
     return iterations;
 }
 
+/* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
+static void so4_manakov_group_advance(so4_manakov_lanes x[restrict 6], so4_manakov_lanes carry[restrict 6],
+    so4_manakov_model *model)
+{
+    for (int i = 0; i < 6; ++i)
+        for (int j = 0; j < 6; ++j) {
+            so4_manakov_EACH_LANE
+            for (int lane = 0; lane < so4_manakov_LANES; ++lane)
+                carry[i][lane] -= model->gain[i * 6 + j][lane] * model->residual[j][lane];
+        }
+    for (int i = 0; i < 6; ++i) {
+        so4_manakov_EACH_LANE
+        for (int lane = 0; lane < so4_manakov_LANES; ++lane) {
+            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
+            const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
+            x[i][lane] = sum + small;
+            carry[i][lane] = small - (x[i][lane] - sum);
+        }
+    }
+}
+
 /* Members that failed, or whose state is not finite, keep the state before the step, and leave. How many stay. */
 static int so4_manakov_group_leave(so4_manakov_group *group, so4_manakov_lanes x[6], so4_manakov_lanes carry[6],
     size_t remaining)
@@ -2508,27 +2529,6 @@ static int so4_manakov_group_leave(so4_manakov_group *group, so4_manakov_lanes x
         if (!group->active[lane] && group->left[lane] == 0) group->left[lane] = remaining;
     }
     return active;
-}
-
-/* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
-static void so4_manakov_group_advance(so4_manakov_lanes x[restrict 6], so4_manakov_lanes carry[restrict 6],
-    so4_manakov_model *model)
-{
-    for (int i = 0; i < 6; ++i)
-        for (int j = 0; j < 6; ++j) {
-            so4_manakov_EACH_LANE
-            for (int lane = 0; lane < so4_manakov_LANES; ++lane)
-                carry[i][lane] -= model->gain[i * 6 + j][lane] * model->residual[j][lane];
-        }
-    for (int i = 0; i < 6; ++i) {
-        so4_manakov_EACH_LANE
-        for (int lane = 0; lane < so4_manakov_LANES; ++lane) {
-            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
-            const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
-            x[i][lane] = sum + small;
-            carry[i][lane] = small - (x[i][lane] - sum);
-        }
-    }
 }
 
 /* One step of all members, of as many as remain. How many members are left. */

@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 396ae8706b7763b7bbf5cc70aa88ccb0cf09610656746c673cd6d824973e2998
+ * body-sha256: c35268c0f9b94507f08a5452c5a6612f72a9e5acc7c6760fc971c2c8626572ba
  */
 #include "spin_chain5.h"
 
@@ -2644,10 +2644,10 @@ typedef struct {
     spin_chain5_lanes coef[1][33], weight[1][32][15];
 } spin_chain5_table;
 
-/* A stage in all lanes, linearised around y: a residual r of alpha(y) = x takes inverse r from y and gain r from the
-   increment. */
+/* A stage in all lanes, linearised around y. */
 typedef struct {
     spin_chain5_lanes y[15], displacement[15], increment[15], residual[15];
+    /* a residual r of alpha(y) = x takes inverse r from y, and gain r from the increment */
     spin_chain5_lanes inverse[225], slope[225], gain[225];
 } spin_chain5_model;
 
@@ -5107,6 +5107,27 @@ static int spin_chain5_group_solve(spin_chain5_group *group, int stage, spin_cha
     return iterations;
 }
 
+/* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
+static void spin_chain5_group_advance(spin_chain5_lanes x[restrict 15], spin_chain5_lanes carry[restrict 15],
+    spin_chain5_model *model)
+{
+    for (int i = 0; i < 15; ++i)
+        for (int j = 0; j < 15; ++j) {
+            spin_chain5_EACH_LANE
+            for (int lane = 0; lane < spin_chain5_LANES; ++lane)
+                carry[i][lane] -= model->gain[i * 15 + j][lane] * model->residual[j][lane];
+        }
+    for (int i = 0; i < 15; ++i) {
+        spin_chain5_EACH_LANE
+        for (int lane = 0; lane < spin_chain5_LANES; ++lane) {
+            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
+            const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
+            x[i][lane] = sum + small;
+            carry[i][lane] = small - (x[i][lane] - sum);
+        }
+    }
+}
+
 /* Members that failed, or whose state is not finite, keep the state before the step, and leave. How many stay. */
 static int spin_chain5_group_leave(spin_chain5_group *group, spin_chain5_lanes x[15], spin_chain5_lanes carry[15],
     size_t remaining)
@@ -5128,27 +5149,6 @@ static int spin_chain5_group_leave(spin_chain5_group *group, spin_chain5_lanes x
         if (!group->active[lane] && group->left[lane] == 0) group->left[lane] = remaining;
     }
     return active;
-}
-
-/* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
-static void spin_chain5_group_advance(spin_chain5_lanes x[restrict 15], spin_chain5_lanes carry[restrict 15],
-    spin_chain5_model *model)
-{
-    for (int i = 0; i < 15; ++i)
-        for (int j = 0; j < 15; ++j) {
-            spin_chain5_EACH_LANE
-            for (int lane = 0; lane < spin_chain5_LANES; ++lane)
-                carry[i][lane] -= model->gain[i * 15 + j][lane] * model->residual[j][lane];
-        }
-    for (int i = 0; i < 15; ++i) {
-        spin_chain5_EACH_LANE
-        for (int lane = 0; lane < spin_chain5_LANES; ++lane) {
-            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
-            const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
-            x[i][lane] = sum + small;
-            carry[i][lane] = small - (x[i][lane] - sum);
-        }
-    }
 }
 
 /* One step of all members, of as many as remain. How many members are left. */

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: d7903a6acc308f1d34df45578f4658859c50226402f71d6cac6e9cf0e03db11c
+ * body-sha256: 2525c8894a9af2217b3cd4525cc09d0c5e4affa1f9796537f2b36bc7e41e1c28
  */
 #include "toda3.h"
 
@@ -679,10 +679,10 @@ typedef struct {
     toda3_lanes coef[1][10], weight[1][32][5];
 } toda3_table;
 
-/* A stage in all lanes, linearised around y: a residual r of alpha(y) = x takes inverse r from y and gain r from the
-   increment. */
+/* A stage in all lanes, linearised around y. */
 typedef struct {
     toda3_lanes y[5], displacement[5], increment[5], residual[5];
+    /* a residual r of alpha(y) = x takes inverse r from y, and gain r from the increment */
     toda3_lanes inverse[25], slope[25], gain[25];
 } toda3_model;
 
@@ -1502,6 +1502,27 @@ static int toda3_group_solve(toda3_group *group, int stage, toda3_model *model)
     return iterations;
 }
 
+/* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
+static void toda3_group_advance(toda3_lanes x[restrict 5], toda3_lanes carry[restrict 5],
+    toda3_model *model)
+{
+    for (int i = 0; i < 5; ++i)
+        for (int j = 0; j < 5; ++j) {
+            toda3_EACH_LANE
+            for (int lane = 0; lane < toda3_LANES; ++lane)
+                carry[i][lane] -= model->gain[i * 5 + j][lane] * model->residual[j][lane];
+        }
+    for (int i = 0; i < 5; ++i) {
+        toda3_EACH_LANE
+        for (int lane = 0; lane < toda3_LANES; ++lane) {
+            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
+            const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
+            x[i][lane] = sum + small;
+            carry[i][lane] = small - (x[i][lane] - sum);
+        }
+    }
+}
+
 /* Members that failed, or whose state is not finite, keep the state before the step, and leave. How many stay. */
 static int toda3_group_leave(toda3_group *group, toda3_lanes x[5], toda3_lanes carry[5],
     size_t remaining)
@@ -1523,27 +1544,6 @@ static int toda3_group_leave(toda3_group *group, toda3_lanes x[5], toda3_lanes c
         if (!group->active[lane] && group->left[lane] == 0) group->left[lane] = remaining;
     }
     return active;
-}
-
-/* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
-static void toda3_group_advance(toda3_lanes x[restrict 5], toda3_lanes carry[restrict 5],
-    toda3_model *model)
-{
-    for (int i = 0; i < 5; ++i)
-        for (int j = 0; j < 5; ++j) {
-            toda3_EACH_LANE
-            for (int lane = 0; lane < toda3_LANES; ++lane)
-                carry[i][lane] -= model->gain[i * 5 + j][lane] * model->residual[j][lane];
-        }
-    for (int i = 0; i < 5; ++i) {
-        toda3_EACH_LANE
-        for (int lane = 0; lane < toda3_LANES; ++lane) {
-            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
-            const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
-            x[i][lane] = sum + small;
-            carry[i][lane] = small - (x[i][lane] - sum);
-        }
-    }
 }
 
 /* One step of all members, of as many as remain. How many members are left. */

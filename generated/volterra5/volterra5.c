@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 5daab4d582de24bb7f6c3799b2774eeaf8f1a7da308c40d0072d6f50905d0da9
+ * body-sha256: b0df10620f4a4760fde8e33ce6768ebc60dbe26a1aabe9a5d726cd484457f659
  */
 #include "volterra5.h"
 
@@ -589,10 +589,10 @@ typedef struct {
     volterra5_lanes coef[1][4], weight[1][32][5];
 } volterra5_table;
 
-/* A stage in all lanes, linearised around y: a residual r of alpha(y) = x takes inverse r from y and gain r from the
-   increment. */
+/* A stage in all lanes, linearised around y. */
 typedef struct {
     volterra5_lanes y[5], displacement[5], increment[5], residual[5];
+    /* a residual r of alpha(y) = x takes inverse r from y, and gain r from the increment */
     volterra5_lanes inverse[25], slope[25], gain[25];
 } volterra5_model;
 
@@ -1409,6 +1409,27 @@ static int volterra5_group_solve(volterra5_group *group, int stage, volterra5_mo
     return iterations;
 }
 
+/* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
+static void volterra5_group_advance(volterra5_lanes x[restrict 5], volterra5_lanes carry[restrict 5],
+    volterra5_model *model)
+{
+    for (int i = 0; i < 5; ++i)
+        for (int j = 0; j < 5; ++j) {
+            volterra5_EACH_LANE
+            for (int lane = 0; lane < volterra5_LANES; ++lane)
+                carry[i][lane] -= model->gain[i * 5 + j][lane] * model->residual[j][lane];
+        }
+    for (int i = 0; i < 5; ++i) {
+        volterra5_EACH_LANE
+        for (int lane = 0; lane < volterra5_LANES; ++lane) {
+            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
+            const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
+            x[i][lane] = sum + small;
+            carry[i][lane] = small - (x[i][lane] - sum);
+        }
+    }
+}
+
 /* Members that failed, or whose state is not finite, keep the state before the step, and leave. How many stay. */
 static int volterra5_group_leave(volterra5_group *group, volterra5_lanes x[5], volterra5_lanes carry[5],
     size_t remaining)
@@ -1430,27 +1451,6 @@ static int volterra5_group_leave(volterra5_group *group, volterra5_lanes x[5], v
         if (!group->active[lane] && group->left[lane] == 0) group->left[lane] = remaining;
     }
     return active;
-}
-
-/* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
-static void volterra5_group_advance(volterra5_lanes x[restrict 5], volterra5_lanes carry[restrict 5],
-    volterra5_model *model)
-{
-    for (int i = 0; i < 5; ++i)
-        for (int j = 0; j < 5; ++j) {
-            volterra5_EACH_LANE
-            for (int lane = 0; lane < volterra5_LANES; ++lane)
-                carry[i][lane] -= model->gain[i * 5 + j][lane] * model->residual[j][lane];
-        }
-    for (int i = 0; i < 5; ++i) {
-        volterra5_EACH_LANE
-        for (int lane = 0; lane < volterra5_LANES; ++lane) {
-            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
-            const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
-            x[i][lane] = sum + small;
-            carry[i][lane] = small - (x[i][lane] - sum);
-        }
-    }
 }
 
 /* One step of all members, of as many as remain. How many members are left. */

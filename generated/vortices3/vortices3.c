@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 77eb9bec10d53cc82d73159bf373ac220b285822a40365a44ffff7a654be71ff
+ * body-sha256: 7ff8be082ac07fb4f2411bb929b48c541baf9eff1c77d56836d512813ce6cb8c
  */
 #include "vortices3.h"
 
@@ -1097,10 +1097,10 @@ typedef struct {
     vortices3_lanes coef[1][3], weight[1][32][6];
 } vortices3_table;
 
-/* A stage in all lanes, linearised around y: a residual r of alpha(y) = x takes inverse r from y and gain r from the
-   increment. */
+/* A stage in all lanes, linearised around y. */
 typedef struct {
     vortices3_lanes y[6], displacement[6], increment[6], residual[6];
+    /* a residual r of alpha(y) = x takes inverse r from y, and gain r from the increment */
     vortices3_lanes inverse[36], slope[36], gain[36];
 } vortices3_model;
 
@@ -2462,6 +2462,27 @@ static int vortices3_group_solve(vortices3_group *group, int stage, vortices3_mo
     return iterations;
 }
 
+/* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
+static void vortices3_group_advance(vortices3_lanes x[restrict 6], vortices3_lanes carry[restrict 6],
+    vortices3_model *model)
+{
+    for (int i = 0; i < 6; ++i)
+        for (int j = 0; j < 6; ++j) {
+            vortices3_EACH_LANE
+            for (int lane = 0; lane < vortices3_LANES; ++lane)
+                carry[i][lane] -= model->gain[i * 6 + j][lane] * model->residual[j][lane];
+        }
+    for (int i = 0; i < 6; ++i) {
+        vortices3_EACH_LANE
+        for (int lane = 0; lane < vortices3_LANES; ++lane) {
+            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
+            const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
+            x[i][lane] = sum + small;
+            carry[i][lane] = small - (x[i][lane] - sum);
+        }
+    }
+}
+
 /* Members that failed, or whose state is not finite, keep the state before the step, and leave. How many stay. */
 static int vortices3_group_leave(vortices3_group *group, vortices3_lanes x[6], vortices3_lanes carry[6],
     size_t remaining)
@@ -2483,27 +2504,6 @@ static int vortices3_group_leave(vortices3_group *group, vortices3_lanes x[6], v
         if (!group->active[lane] && group->left[lane] == 0) group->left[lane] = remaining;
     }
     return active;
-}
-
-/* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
-static void vortices3_group_advance(vortices3_lanes x[restrict 6], vortices3_lanes carry[restrict 6],
-    vortices3_model *model)
-{
-    for (int i = 0; i < 6; ++i)
-        for (int j = 0; j < 6; ++j) {
-            vortices3_EACH_LANE
-            for (int lane = 0; lane < vortices3_LANES; ++lane)
-                carry[i][lane] -= model->gain[i * 6 + j][lane] * model->residual[j][lane];
-        }
-    for (int i = 0; i < 6; ++i) {
-        vortices3_EACH_LANE
-        for (int lane = 0; lane < vortices3_LANES; ++lane) {
-            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
-            const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
-            x[i][lane] = sum + small;
-            carry[i][lane] = small - (x[i][lane] - sum);
-        }
-    }
 }
 
 /* One step of all members, of as many as remain. How many members are left. */

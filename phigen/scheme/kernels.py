@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from fractions import Fraction
 
 from phigen.geometry.system import System
 from phigen.realisations.protocol import BiRealisation
+from phigen.scheme.elimination import Factors, Pattern, elimination, factorise, inversion
 from phigen.scheme.generating import GeneratingFunction
+from phigen.scheme.lowering import cost
 from phigen.scheme.program import Kernel, Output
 from phigen.scheme.staging import Coefficients
-from phigen.scheme.step import at_momenta, elimination, explicit_increment, explicit_order, inversion, linearise
+from phigen.scheme.step import at_momenta, explicit_increment, explicit_order, linearise
 from phigen.series.hamilton_jacobi import momentum
-from phigen.symbolic.expression import ONE, ZERO, Expression, number, total
+from phigen.symbolic.expression import ONE, ZERO, Expression, number, symbol, total
 
-#: Largest dimension whose elimination is unrolled.
-UNROLLED = 4
+#: Largest dimension whose elimination is unrolled in any case; beyond, where zeros leave no more than such a part of n³
+#: operations (a full matrix takes 0.7).
+UNROLLED, SPARSE = 4, 0.6
 
 
 def step_kernels(
@@ -58,34 +62,73 @@ def step_kernels(
             named,
         )
     }
-    return kernels | _elimination_kernel(n) | ({"invert": inverse(n)} if n <= UNROLLED else {})
+    jacobian, slope = (_pattern(o.values) for o in outputs[2:])
+    if n <= UNROLLED:
+        return kernels | _elimination_kernel(jacobian) | {"invert": inverse(n)}
+    factors = factorise(jacobian)
+    if cost(factors.solved([symbol(f"r:{i}") for i in range(n)])) > SPARSE * n**3:
+        return kernels
+    return kernels | _elimination_kernel(jacobian) | _factor_kernels(factors, slope)
 
 
-def _elimination_kernel(n: int) -> dict[str, Kernel]:
-    if n > UNROLLED:
-        return {}
-    solution, reciprocals = elimination(n)
+def _pattern(entries: Sequence[Expression]) -> Pattern:
+    n = math.isqrt(len(entries))
+    return [[not entries[i * n + j].is_zero for j in range(n)] for i in range(n)]
+
+
+def _full(n: int) -> Pattern:
+    return [[True] * n] * n
+
+
+def _elimination_kernel(pattern: Pattern) -> dict[str, Kernel]:
+    n = len(pattern)
+    solution, reciprocals = elimination(pattern)
     return {
         "eliminate": Kernel(
             "eliminate",
             "elimination without pivoting: the solution, and the reciprocals of the pivots",
             {
-                "matrix": tuple(f"J:{i}:{j}" for i in range(n) for j in range(n)),
+                "matrix": _entries("J", n),
                 "side": tuple(f"r:{i}" for i in range(n)),
             },
-            (Output("solution", tuple(solution)), Output("reciprocal", tuple(reciprocals))),
+            (Output("solution", tuple(solution)), Output("reciprocal", reciprocals)),
         )
+    }
+
+
+def _entries(name: str, n: int) -> tuple[str, ...]:
+    return tuple(f"{name}:{i}:{j}" for i in range(n) for j in range(n))
+
+
+def _factor_kernels(factors: Factors, slope: Pattern) -> dict[str, Kernel]:
+    """Elimination in two parts, for many right-hand sides, and the product of each solution with the slope."""
+    n, named = len(slope), factors.named("f")
+    side = tuple(f"r:{i}" for i in range(n))
+    solution = named.solved([symbol(s) for s in side])
+    product = [total(symbol(f"K:{i}:{j}") * solution[j] for j in range(n) if slope[i][j]) for i in range(n)]
+    return {
+        "factorise": Kernel(
+            "factorise",
+            "elimination without pivoting: the factors of the matrix, the reciprocals of the pivots first",
+            {"matrix": _entries("J", n)},
+            (Output("factor", factors.values),),
+        ),
+        "substitute": Kernel(
+            "substitute",
+            "the solution for a right-hand side, from the factors, and the slope times it",
+            {"factor": tuple(str(e.value) for e in named.values), "slope": _entries("K", n), "side": side},
+            (Output("solution", tuple(solution)), Output("product", tuple(product))),
+        ),
     }
 
 
 def inverse(n: int) -> Kernel:
     """The inverse of a matrix, and a product with it, unrolled."""
     entries, gain, reciprocals = inversion(n)
-    pairs = [(i, j) for i in range(n) for j in range(n)]
     return Kernel(
         "invert",
         "elimination without pivoting: the inverse, the slope times the inverse, the reciprocals of the pivots",
-        {"matrix": tuple(f"J:{i}:{j}" for i, j in pairs), "slope": tuple(f"K:{i}:{j}" for i, j in pairs)},
+        {"matrix": _entries("J", n), "slope": _entries("K", n)},
         (Output("inverse", tuple(entries)), Output("gain", tuple(gain)), Output("reciprocal", tuple(reciprocals))),
     )
 
@@ -106,7 +149,7 @@ def path_kernels(system: System, generating: GeneratingFunction, coefficients: C
         {"coef": coefficients.slots, "y": system.coordinates},
         _outputs(flat, ("slope", "jacobian"), (n, n * n)),
     )
-    return {"generate": generate} | _elimination_kernel(n)
+    return {"generate": generate} | (_elimination_kernel(_full(n)) if n <= UNROLLED else {})
 
 
 def _outputs(values: Sequence[Expression], names: Sequence[str], sizes: Sequence[int]) -> tuple[Output, ...]:

@@ -9,8 +9,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from phigen.scheme.elimination import inversion
 from phigen.scheme.program import Kernel, Output
-from phigen.scheme.step import Matrix, inversion
+from phigen.scheme.step import Matrix
 from phigen.symbolic.expression import ONE, ZERO, Expression, substitute, symbol, total
 
 

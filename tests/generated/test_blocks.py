@@ -41,6 +41,21 @@ def test_blocks_of_several_stages_equal_single_steps(name, tmp_path):
     exercise(compilation, "-O2", tmp_path)
 
 
+@pytest.mark.parametrize("composition", ["none", "suzuki"])
+@pytest.mark.parametrize("optimisation", ["-O1", "-O3"])
+def test_blocks_with_sparse_factors_equal_single_steps(composition, optimisation, tmp_path):
+    """A ring of nine species, whose Newton matrix has three entries in each row."""
+    n = 9
+    rows = [[(j - i) % n == 1 for j in range(n)] for i in range(n)]
+    pi = [[int(rows[i][j]) - int(rows[j][i]) for j in range(n)] for i in range(n)]
+    text = f"coordinates: [{', '.join(f'v{i}' for i in range(n))}]\nhamiltonian: {' + '.join(f'v{i}' for i in range(n))}\n"
+    text += f"poisson: {{log_canonical: {pi}}}\norder: {2 if composition == 'none' else 4}\ncomposition: {composition}\n"
+    start = [round(1 + 0.3 * (i % 4), 2) for i in range(n)]
+    compilation = compile_text(f"{text}runs: {{r: {{initial: {start}, step: 0.2, steps: 10}}}}\n")
+    assert {"factorise", "eliminate"} <= set(compilation.program.kernels)
+    exercise(compilation, optimisation, tmp_path, foreseen=False, units=200)  # with the inverse: 91
+
+
 def test_members_go_one_by_one_where_a_group_would_take_too_much_stack():
     """Seventeen stages: blocks are small enough, groups with the past values of eight members are not."""
     composed = replace(compiled("rigid_body").spec, composition="kahan-li")
@@ -53,16 +68,16 @@ def test_members_go_one_by_one_where_a_group_would_take_too_much_stack():
     np.testing.assert_allclose(many[0], alone, rtol=0, atol=1e-15)
 
 
-def exercise(compilation, optimisation, folder):
+def exercise(compilation, optimisation, folder, *, foreseen=True, units=2):
     """Build and run blocks.c for a system."""
     name = compilation.program.name
     code = emit(compilation.program, "c", COMMAND, single_file=True)
     write(folder, code)
     at = setting(compilation)
     definitions = [f"-DNAME={name}", f'-DSOURCE="{name}.c"', f"-DSTEP={at.h!r}"]
-    definitions.append(f"-DULPS={GROWING.get(name, 2 * len(compilation.program.fractions))}")
+    definitions.append(f"-DULPS={GROWING.get(name, units * len(compilation.program.fractions))}")
     definitions.append(f"-DGROUPS={int(f'{name}_group;' in code[f'{name}.c'])}")
-    definitions.append(f"-DFORESEEN={int(name not in UNFORESEEN)}")
+    definitions.append(f"-DFORESEEN={int(foreseen and name not in UNFORESEEN)}")
     definitions.append("-DSTATE=" + ", ".join(map(repr, at.x)))
     flags = ["-std=c99", optimisation, "-Wall", "-Wextra", "-Werror", "-Wno-unused-function"]
     run([tool("gcc"), *flags, *definitions, "-I.", EXERCISE, "-o", "blocks", "-lm"], folder)

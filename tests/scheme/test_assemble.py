@@ -11,7 +11,6 @@ from phigen.scheme.discretisation import GRAPH_TERMS, generating_function, serie
 from phigen.scheme.generating import STEP, collected_form, graph_form
 from phigen.scheme.order import Order, plan_order
 from phigen.scheme.staging import Coefficients
-from phigen.scheme.step import elimination
 from phigen.series.hamilton_jacobi import graph_series
 
 
@@ -131,25 +130,3 @@ def test_separable_hamiltonians_give_explicit_steps(hamiltonian, order, side, dr
 
 def test_symmetric_realisations_are_solved_by_newton_iteration():
     assert compile_text(f"{PAIR}hamiltonian: p**2/2 - cos(q)\norder: 1\n").program.driver == "newton"
-
-
-# -- elimination
-
-
-@pytest.mark.parametrize("n", [1, 2, 3, 4])
-def test_unrolled_elimination_solves_linear_systems(n):
-    solution, reciprocals = elimination(n)
-    with mpmath.workdps(30):
-        matrix = mpmath.matrix(n, n)
-        for i in range(n):
-            for j in range(n):
-                matrix[i, j] = (i == j) + mpmath.mpf((3 * i - 5 * j + i * j) % 7) / 23
-        side = mpmath.matrix([mpmath.mpf(2 * i - 3) / 7 for i in range(n)])
-        at = {f"J:{i}:{j}": matrix[i, j] for i in range(n) for j in range(n)}
-        at |= {f"r:{i}": side[i] for i in range(n)}
-        found = mpmath.matrix(values(solution, at))
-        assert mpmath.norm(matrix * found - side) < mpmath.mpf(10) ** -25
-        pivots = mpmath.mpf(1)
-        for r in values(reciprocals, at):
-            pivots /= r
-        assert mpmath.almosteq(pivots, mpmath.det(matrix), mpmath.mpf(10) ** -25)

@@ -48,29 +48,33 @@ def function(
     *,
     exported: bool = False,
     lanes: bool = False,
+    single: bool = False,
+    sparse: bool = False,
     shared: Sequence[str] = (),
     functions: Mapping[str, str] | None = None,
 ) -> str:
     """The C source of a kernel: one function, or a chain of static ones that share a workspace.
 
     With ``lanes`` the kernel is evaluated at `LANES` points: each value becomes an array over them, but for the inputs
-    that are ``shared``. ``functions`` are the names of those that it calls.
+    that are ``shared``. A ``single`` one is evaluated at one of these points, the argument ``lane``, and its outputs
+    are numbers. What is always zero is not stored if ``sparse``. ``functions`` are the names of those that it calls.
     """
     pieces = parts(lower(kernel), LONGEST_FUNCTION)
     workspace = 1 + max((int(a.target[2:]) for p in pieces for a in p.assignments if a.target[:2] == "w:"), default=0)
     if functions is None:
         functions = lane_calls(program) if lanes else FUNCTIONS
-    name = f"{program.name}_{kernel.name}{'_lanes' if lanes else ''}"
-    form = Form(name, exported, lanes, functions, frozenset(shared))
+    name = f"{program.name}_{kernel.name}{'_lane' if single else '_lanes' if lanes else ''}"
+    plain_arrays = {*shared, "work", *(o.name for o in kernel.outputs)} if single else {*shared}
+    form = Form(name, exported, lanes, functions, frozenset(plain_arrays), single=single, sparse=sparse)
     if len(pieces) == 1:
         return _definition(program, kernel, form, pieces[0])
     texts = []
     for k, piece in enumerate(pieces, 1):
         part = replace(form, name=f"{form.name}_part{k}", workspace=workspace, part=(k, len(pieces)))
         texts.append(_definition(program, kernel, part, piece))
-    arguments = ", ".join([*kernel.inputs, *(o.name for o in kernel.outputs), "work"])
+    arguments = ", ".join([*kernel.inputs, *(["lane"] if single else []), *(o.name for o in kernel.outputs), "work"])
     lines = [_purpose(program, kernel, form), *_signature(program, kernel, form), "{"]
-    lines.append(f"    {f'{program.name}_lanes' if lanes else 'double'} work[{workspace}];")
+    lines.append(f"    {form.number(program, 'work')} work[{workspace}];")
     if exported and "params" in kernel.inputs:
         lines.append(f"    if (params == NULL) params = &{program.name}_default_params;")
     lines += [f"    {form.name}_part{k}({arguments});" for k in range(1, len(pieces) + 1)]
@@ -85,8 +89,8 @@ def lane_calls(program: Program) -> Mapping[str, str]:
 
 @dataclass(frozen=True)
 class Form:
-    """How a kernel is printed: name and linkage; at one point or in lanes; what it calls; which inputs all lanes share;
-    whole, or a ``part``."""
+    """How a kernel is printed: name and linkage; at one point or in lanes; what it calls; which arrays all lanes share;
+    whole, or a ``part``; at a ``single`` lane; without zeros if ``sparse``."""
 
     name: str
     exported: bool = False
@@ -95,6 +99,12 @@ class Form:
     shared: frozenset[str] = frozenset()
     workspace: int = 0
     part: tuple[int, int] = (1, 1)
+    single: bool = False
+    sparse: bool = False
+
+    def number(self, program: Program, array: str) -> str:
+        """The type of an entry of an array."""
+        return f"{program.name}_lanes" if self.lanes and array not in self.shared else "double"
 
     def lane(self, array: str) -> str:
         """The inner index of an array."""
@@ -102,6 +112,8 @@ class Form:
 
 
 def _purpose(program: Program, kernel: Kernel, form: Form) -> str:
+    if form.single:
+        return _comment(f"{kernel.purpose}; in one lane")
     if form.lanes:
         return f"/* {program.name}_{kernel.name} in all lanes. */"
     return _comment(kernel.purpose)
@@ -113,7 +125,7 @@ def _definition(program: Program, kernel: Kernel, form: Form, code: Code) -> str
     if form.part[1] > 1:
         head = f"/* {form.name} {part} */" if form.lanes else _comment(f"{kernel.purpose} {part}")
     body = _body(program, kernel, form, code)
-    if form.lanes:
+    if form.lanes and not form.single:
         loop = [f"{each_lane(program)}", f"for (int lane = 0; lane < {program.name}_LANES; ++lane) {{"]
         body = [line for line in body if "(void)" in line] + [
             *(f"    {line}" for line in loop),
@@ -138,12 +150,13 @@ def _signature(program: Program, kernel: Kernel, form: Form) -> list[str]:
     ]
     # restrict: the outputs never overlap the inputs of our own calls; callers of the API get no such duty.
     qualifier = "" if form.exported else "restrict "
+    arguments += ["int lane"] if form.single else []
     for o in kernel.outputs:
         # The caller of NAME_casimirs sizes the array by NAME_CASIMIRS, which may be 0.
         length = "" if form.exported and kernel.name == "casimirs" else f"{qualifier}{max(1, len(o.values))}"
-        arguments.append(f"{number} {o.name}[{length}]")
+        arguments.append(f"{form.number(program, o.name)} {o.name}[{length}]")
     if form.workspace:
-        arguments.append(f"{number} work[restrict {form.workspace}]")
+        arguments.append(f"{form.number(program, 'work')} work[restrict {form.workspace}]")
     kind = "void " if form.exported else f"{apart(program)} static void " if form.workspace else "static void "
     return wrapped_arguments(f"{kind}{form.name}(", arguments)
 
@@ -187,8 +200,9 @@ def _body(program: Program, kernel: Kernel, form: Form, code: Code) -> list[str]
     for a in code.assignments:
         declare = "" if a.target.startswith("w:") else "const double "
         lines.append(f"    {declare}{scope[a.target]} = {show(a.value)};")
-    filled = {s.array for s in code.stores}
-    lines += [f"    {s.array}[{s.index}]{form.lane(s.array)} = {show(s.value)};" for s in code.stores]
+    stores = [s for s in code.stores if not (form.sparse and s.value.is_zero)]
+    filled = {s.array for s in stores}
+    lines += [f"    {s.array}[{s.index}]{form.lane(s.array)} = {show(s.value)};" for s in stores]
     unused = [i for i in kernel.inputs if i not in touched]
     unused += [o.name for o in kernel.outputs if o.name not in filled]
     if form.workspace and not any("work[" in line for line in lines):

@@ -29,10 +29,13 @@ FROZEN = 1e-5
 INLINE = {"abs", "sqrt", "sign", "inv"}
 
 #: Templates in the order in which they call one another.
-_MODELS = ("sizes", "correct", "near_lanes", "solved")
+_MODELS = ("sizes", "correct", "largest", "near_lanes", "solved")
 _BLOCKS = ("chain", "block", "march", "block_step", "choose_guess", "integrate_blocks")
 _GUESSES = ("group", "group_guess", "group_fit", "stay_near")
-_GROUPS = (*_GUESSES, "group_solve", "group_leave", "group_step", "group_run", "ensemble")
+_GROUPS = (*_GUESSES, "group_solve", "group_advance", "group_leave", "group_step", "group_run", "ensemble")
+
+#: Those of which there are others for matrices with many zeros.
+_DENSE = ("correct", "chain", "group_advance")
 
 _MEMBERS = [
     "double effort;  /* evaluations that a single step takes, for each stage */",
@@ -118,7 +121,7 @@ def values(program: Program, memory: Mapping[str, int]) -> Mapping[str, object]:
         "floor": "0.0" if program.relative else "1e-6",
         "frozen": repr(FROZEN),
         "passes": PASSES if vectorised(program) and not program.path else PASSES_OF_CALLS,
-        "model_members": paths.model_members(program) if blocks(program) else [],
+        "model_members": _matrices(program) + paths.model_members(program) if blocks(program) else [],
         "ensemble_how": f"{LANES} are integrated\n   side by side, and with OpenMP such groups in parallel."
         if grouped
         else "Each is integrated by itself.",
@@ -129,6 +132,26 @@ def values(program: Program, memory: Mapping[str, int]) -> Mapping[str, object]:
         **_group_values(program),
         "block_reset": _RESET if blocks(program) else [],
     }
+
+
+def sparse(program: Program) -> bool:
+    """Whether the Newton matrix has so many zeros that its factors are kept, not its inverse."""
+    return "factorise" in program.kernels
+
+
+def _matrices(program: Program) -> list[str]:
+    """The matrices of a model."""
+    lanes, n = f"{program.name}_lanes", program.dimension
+    if not sparse(program):
+        said = "a residual r of alpha(y) = x takes inverse r from y, and gain r from the increment"
+        return [f"/* {said} */", f"{lanes} inverse[{n * n}], slope[{n * n}], gain[{n * n}];"]
+    factors = len(program.kernels["factorise"].outputs[0].values)
+    said = "of the Jacobian of alpha(y); that of the increment; what corrections take from the increment"
+    return [f"/* {said} */", f"{lanes} factor[{factors}], slope[{n * n}], gained[{n}];"]
+
+
+def _templates(program: Program, names: Sequence[str]) -> list[str]:
+    return [f"{name}_sparse" if sparse(program) and name in _DENSE else name for name in names]
 
 
 def _group_values(program: Program) -> Mapping[str, object]:
@@ -151,20 +174,27 @@ def pieces(program: Program, values: Mapping[str, Any]) -> list[str]:
     found = [render("c", f"{template}.c", values) for template in ("lanes", "table")]
     found += lane_functions(program, _operations(program))
     found += _paths(program, values) if program.path else _stages(program, values)
-    return found + [render("c", f"{template}.c", values) for template in (*_BLOCKS, *ensemble, "lanes_end")]
+    names = _templates(program, (*_BLOCKS, *ensemble, "lanes_end"))
+    return found + [render("c", f"{template}.c", values) for template in names]
 
 
 def _stages(program: Program, values: Mapping[str, Any]) -> list[str]:
     """A stage in all lanes, for alpha and beta that are formulas."""
     kernel = program.kernels["linearise"]
-    found = [function(program, kernel, lanes=True) + "\n"]
+    found = [function(program, kernel, lanes=True, sparse=sparse(program)) + "\n"]
     found.append(function(program, _without_matrices(kernel), lanes=True) + "\n")
-    if "invert" in program.kernels:
+    if sparse(program):
+        substitute = program.kernels["substitute"]
+        found.append(function(program, program.kernels["factorise"], lanes=True) + "\n")
+        found.append(function(program, substitute, lanes=True) + "\n")
+        found.append(function(program, substitute, lanes=True, single=True, shared=["side"]) + "\n")
+        found.append(render("c", "tabulate_sparse.c", values))
+    elif "invert" in program.kernels:
         found.append(function(program, program.kernels["invert"], lanes=True) + "\n")
         found.append(render("c", "tabulate_unrolled.c", values))
     else:
         found.append(render("c", "tabulate.c", values))
-    return found + [render("c", f"{template}.c", values) for template in (*_MODELS, "update")]
+    return found + [render("c", f"{template}.c", values) for template in _templates(program, (*_MODELS, "update"))]
 
 
 def _paths(program: Program, values: Mapping[str, Any]) -> list[str]:

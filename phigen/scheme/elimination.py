@@ -1,0 +1,107 @@
+"""Gaussian elimination without pivoting, unrolled, for matrices of a known pattern of zeros.
+
+The Newton matrix is I + O(h), so its pivots are near 1; the driver watches them and falls back to elimination with
+pivoting. The order of the pivots, all on the diagonal, is that of least degree (Markowitz), which keeps the factors of
+lattices and trees as sparse as the matrix.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from phigen.symbolic.expression import ZERO, Expression, symbol, total
+
+#: pattern[i][j]: whether entry (i, j) may differ from zero; the diagonal always may.
+Pattern = Sequence[Sequence[bool]]
+
+
+def pivot_order(pattern: Pattern) -> list[int]:
+    """The pivots, each the one whose row and column meet the fewest others; ties go to the first."""
+    n = len(pattern)
+    rows = [{j for j in range(n) if pattern[i][j] and j != i} for i in range(n)]
+    columns = [{i for i in range(n) if pattern[i][j] and j != i} for j in range(n)]
+    left, order = set(range(n)), []
+    while left:
+        k = min(left, key=lambda k: (len(rows[k]) * len(columns[k]), k))
+        order.append(k)
+        left.remove(k)
+        for i in columns[k]:
+            rows[i] = (rows[i] | rows[k]) - {i, k}
+        for j in rows[k]:
+            columns[j] = (columns[j] | columns[k]) - {j, k}
+    return order
+
+
+@dataclass(frozen=True)
+class Factors:
+    """A matrix as P L U Pᵀ: pivots in order, multipliers (row, pivot), rows of U by pivot, reciprocal pivots."""
+
+    order: tuple[int, ...]
+    lower: dict[tuple[int, int], Expression]
+    upper: dict[tuple[int, int], Expression]
+    reciprocals: tuple[Expression, ...]
+
+    @property
+    def values(self) -> tuple[Expression, ...]:
+        """All numbers that `solved` reads: reciprocal pivots, multipliers, entries of U."""
+        return (*self.reciprocals, *self.lower.values(), *self.upper.values())
+
+    def named(self, prefix: str) -> Factors:
+        """The same with symbols ``prefix:k`` for `values`."""
+        names: Iterator[Expression] = (symbol(f"{prefix}:{k}") for k in range(len(self.values)))
+        reciprocals = tuple(next(names) for _ in self.reciprocals)
+        lower = {place: next(names) for place in self.lower}
+        return Factors(self.order, lower, {place: next(names) for place in self.upper}, reciprocals)
+
+    def solved(self, side: Sequence[Expression]) -> list[Expression]:
+        """The solution for a right-hand side."""
+        b, x = list(side), [ZERO] * len(side)
+        for (i, k), factor in self.lower.items():
+            b[i] = b[i] - factor * b[k]
+        for k in reversed(self.order):
+            rest = total(e * x[j] for (row, j), e in self.upper.items() if row == k)
+            x[k] = (b[k] - rest) * self.reciprocals[k]
+        return x
+
+
+def factorise(pattern: Pattern) -> Factors:
+    """The factors of the matrix with entries ``J:i:j`` where the pattern has them."""
+    n = len(pattern)
+    a = [[symbol(f"J:{i}:{j}") if pattern[i][j] or i == j else ZERO for j in range(n)] for i in range(n)]
+    lower: dict[tuple[int, int], Expression] = {}
+    upper: dict[tuple[int, int], Expression] = {}
+    reciprocals: list[Expression] = [ZERO] * n
+    order = pivot_order(pattern)
+    for position, k in enumerate(order):
+        later = order[position + 1 :]
+        reciprocals[k] = 1 / a[k][k]
+        upper |= {(k, j): a[k][j] for j in later if not a[k][j].is_zero}
+        for i in (i for i in later if not a[i][k].is_zero):
+            factor = lower[i, k] = a[i][k] * reciprocals[k]
+            for j in later:
+                a[i][j] = a[i][j] - factor * a[k][j]
+    return Factors(tuple(order), lower, upper, tuple(reciprocals))
+
+
+def elimination(pattern: Pattern) -> tuple[list[Expression], tuple[Expression, ...]]:
+    """The solution for the right-hand side ``r:i``, and the reciprocal pivots."""
+    factors = factorise(pattern)
+    return factors.solved([symbol(f"r:{i}") for i in range(len(pattern))]), factors.reciprocals
+
+
+def inversion(n: int) -> tuple[list[Expression], list[Expression], list[Expression]]:
+    """J⁻¹ and K J⁻¹ of full n×n matrices, row by row, by Gauss–Jordan elimination; the reciprocal pivots.
+
+    Symbols ``J:i:j`` and ``K:i:j``.
+    """
+    a = [[symbol(f"J:{i}:{j}") for j in range(n)] for i in range(n)]
+    reciprocals: list[Expression] = []
+    for k in range(n):
+        reciprocals.append(1 / a[k][k])
+        a[k] = [reciprocals[k] if j == k else a[k][j] * reciprocals[k] for j in range(n)]
+        for i in (i for i in range(n) if i != k):
+            factor = a[i][k]
+            a[i] = [-(factor * a[k][j]) if j == k else a[i][j] - factor * a[k][j] for j in range(n)]
+    product = [total(symbol(f"K:{i}:{k}") * a[k][j] for k in range(n)) for i in range(n) for j in range(n)]
+    return [e for row in a for e in row], product, reciprocals

@@ -1,0 +1,75 @@
+"""Unrolled elimination for matrices of a known pattern of zeros."""
+
+import mpmath
+import pytest
+from support import values
+
+from phigen.scheme.elimination import elimination, factorise, pivot_order
+from phigen.symbolic.expression import symbol
+from phigen.symbolic.numeric import evaluate
+
+
+def ring(n):
+    """Neighbours on a ring."""
+    return [[(i - j) % n in (0, 1, n - 1) for j in range(n)] for i in range(n)]
+
+
+def star(n):
+    """All meet the first, and nothing else."""
+    return [[0 in (i, j) or i == j for j in range(n)] for i in range(n)]
+
+
+def one_sided(n):
+    return [[j in (i, (3 * i + 1) % n, (5 * i + 2) % n) for j in range(n)] for i in range(n)]
+
+
+PATTERNS = {"full": [[True] * 4] * 4, "ring": ring(9), "star": star(8), "one-sided": one_sided(11), "one": [[True]]}
+
+
+def entry(i, j):
+    return (i == j) + mpmath.mpf((3 * i - 5 * j + i * j) % 7 + 1) / 41
+
+
+@pytest.mark.parametrize("name", PATTERNS)
+def test_elimination_solves_linear_systems(name):
+    pattern = PATTERNS[name]
+    n = len(pattern)
+    with mpmath.workdps(30):
+        matrix = mpmath.matrix(n, n)
+        for i in range(n):
+            for j in range(n):
+                matrix[i, j] = entry(i, j) if pattern[i][j] else 0
+        side = mpmath.matrix([mpmath.mpf(2 * i - 3) / 7 for i in range(n)])
+        at = {f"J:{i}:{j}": matrix[i, j] for i in range(n) for j in range(n) if pattern[i][j]}
+        at |= {f"r:{i}": side[i] for i in range(n)}
+        solution, reciprocals = elimination(pattern)
+        found = mpmath.matrix(values(solution, at))
+        assert mpmath.norm(matrix * found - side) < mpmath.mpf(10) ** -25
+        pivots = mpmath.mpf(1)
+        for r in values(reciprocals, at):
+            pivots /= r
+        assert mpmath.almosteq(pivots, mpmath.det(matrix), mpmath.mpf(10) ** -25)
+
+
+@pytest.mark.parametrize("name", PATTERNS)
+def test_factors_solve_as_elimination_does(name):
+    factors = factorise(PATTERNS[name])
+    n = len(PATTERNS[name])
+    at = {f"J:{i}:{j}": float(entry(i, j)) for i in range(n) for j in range(n)} | {f"r:{i}": i - 2.5 for i in range(n)}
+    kept = dict(zip([str(e.value) for e in factors.named("f").values], evaluate(list(factors.values), at), strict=True))
+    side = [symbol(f"r:{i}") for i in range(n)]
+    assert evaluate(factors.named("f").solved(side), at | kept) == pytest.approx(
+        evaluate(elimination(PATTERNS[name])[0], at), rel=1e-13
+    )
+
+
+def test_the_centre_of_a_star_is_the_last_pivot_and_nothing_fills_in():
+    """In the order of the coordinates the first pivot would couple all others: 56 entries of U and L instead of 14."""
+    factors = factorise(star(8))
+    assert pivot_order(star(8))[-2:] in ([0, 7], [7, 0])
+    assert len(factors.lower) + len(factors.upper) == 14
+
+
+def test_on_a_ring_only_what_closes_it_fills_in():
+    factors = factorise(ring(30))
+    assert len(factors.lower) + len(factors.upper) <= 4 * 30
