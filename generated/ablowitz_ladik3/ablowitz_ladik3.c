@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: c31fdcca4d9cfca903ef76071fa383dd424532769e2e2c06cb03eeffc3e5a577
+ * body-sha256: dcb81b5d8709c24baefd794d1c08ac678c470a0a024b9afea8d43146cd413573
  */
 #include "ablowitz_ladik3.h"
 
@@ -334,6 +334,26 @@ static void ablowitz_ladik3_remember(ablowitz_ladik3_memory *memory, const doubl
     if (memory->slow > memory->patience && memory->count >= 96) ablowitz_ladik3_fit(memory);
 }
 
+/* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved by a point far
+   away, at another energy, that has nothing to do with it. */
+static int ablowitz_ladik3_plausible(const ablowitz_ladik3_solver *s, int stage, const double increment[6])
+{
+    double moved = 0.0, size = 0.0, field[6], end[6];
+    for (int i = 0; i < 6; ++i) {
+        moved += fabs(increment[i]);
+        size += fabs(s->x[i]);
+    }
+    if (moved <= 2.0 * size) return 1;
+    ablowitz_ladik3_vector_field(&s->params, s->x, field);
+    for (int i = 0; i < 6; ++i) {
+        size += fabs(ablowitz_ladik3_fractions[stage] * s->h * field[i]);
+        end[i] = s->x[i] + increment[i];
+    }
+    if (moved <= 2.0 * size) return 1;
+    const double before = ablowitz_ladik3_hamiltonian(&s->params, s->x), after = ablowitz_ladik3_hamiltonian(&s->params, end);
+    return fabs(after - before) <= 0.5 * (fabs(before) + fabs(after));
+}
+
 /* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last
    bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the
    sum is not finite. */
@@ -553,6 +573,7 @@ static ablowitz_ladik3_status ablowitz_ladik3_attempt(ablowitz_ladik3_solver *s,
         size /= norm;
         /* The second test: residuals no longer shrink, the solve has reached the level of rounding. */
         if (size <= 4e-16 || (previous < 1e-12 && size > 0.25 * previous)) {
+            if (!ablowitz_ladik3_plausible(s, stage, change)) return ablowitz_ladik3_NO_CONVERGENCE;
             if (!ablowitz_ladik3_advance(s, change, none)) return ablowitz_ladik3_NOT_FINITE;
             ablowitz_ladik3_remember(memory, y, iteration);
             return ablowitz_ladik3_OK;

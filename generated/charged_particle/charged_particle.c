@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: c011910c657fe630e550fd7bfec54fd88b80b5e537cc4cbd1496091ea7918621
+ * body-sha256: 382d13f002262e2f83cb8dc954bb4f19dc05b36c8327b16be96ed876c572c5ff
  */
 #include "charged_particle.h"
 
@@ -350,6 +350,26 @@ static void charged_particle_remember(charged_particle_memory *memory, const dou
     if (memory->slow > memory->patience && memory->count >= 96) charged_particle_fit(memory);
 }
 
+/* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved by a point far
+   away, at another energy, that has nothing to do with it. */
+static int charged_particle_plausible(const charged_particle_solver *s, int stage, const double increment[6])
+{
+    double moved = 0.0, size = 0.0, field[6], end[6];
+    for (int i = 0; i < 6; ++i) {
+        moved += fabs(increment[i]);
+        size += fabs(s->x[i]);
+    }
+    if (moved <= 2.0 * size) return 1;
+    charged_particle_vector_field(&s->params, s->x, field);
+    for (int i = 0; i < 6; ++i) {
+        size += fabs(charged_particle_fractions[stage] * s->h * field[i]);
+        end[i] = s->x[i] + increment[i];
+    }
+    if (moved <= 2.0 * size) return 1;
+    const double before = charged_particle_hamiltonian(&s->params, s->x), after = charged_particle_hamiltonian(&s->params, end);
+    return fabs(after - before) <= 0.5 * (fabs(before) + fabs(after));
+}
+
 /* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last
    bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the
    sum is not finite. */
@@ -547,6 +567,7 @@ static charged_particle_status charged_particle_attempt(charged_particle_solver 
         size /= norm;
         /* The second test: residuals no longer shrink, the solve has reached the level of rounding. */
         if (size <= 4e-16 || (previous < 1e-12 && size > 0.25 * previous)) {
+            if (!charged_particle_plausible(s, stage, change)) return charged_particle_NO_CONVERGENCE;
             if (!charged_particle_advance(s, change, none)) return charged_particle_NOT_FINITE;
             charged_particle_remember(memory, y, iteration);
             return charged_particle_OK;

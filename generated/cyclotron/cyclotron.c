@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: a8f92c0a5902c2550e9c8c88ffee7fb55d8f9bee04d8aaf31d16a410329c0d08
+ * body-sha256: 2969786409ed9a23a2ae794320e08f740c0aab39726f323b443886d0c5a08177
  */
 #include "cyclotron.h"
 
@@ -321,6 +321,26 @@ static void cyclotron_remember(cyclotron_memory *memory, const double value[3], 
     if (memory->slow > memory->patience && memory->count >= 95) cyclotron_fit(memory);
 }
 
+/* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved by a point far
+   away, at another energy, that has nothing to do with it. */
+static int cyclotron_plausible(const cyclotron_solver *s, int stage, const double increment[3])
+{
+    double moved = 0.0, size = 0.0, field[3], end[3];
+    for (int i = 0; i < 3; ++i) {
+        moved += fabs(increment[i]);
+        size += fabs(s->x[i]);
+    }
+    if (moved <= 2.0 * size) return 1;
+    cyclotron_vector_field(&s->params, s->x, field);
+    for (int i = 0; i < 3; ++i) {
+        size += fabs(cyclotron_fractions[stage] * s->h * field[i]);
+        end[i] = s->x[i] + increment[i];
+    }
+    if (moved <= 2.0 * size) return 1;
+    const double before = cyclotron_hamiltonian(&s->params, s->x), after = cyclotron_hamiltonian(&s->params, end);
+    return fabs(after - before) <= 0.5 * (fabs(before) + fabs(after));
+}
+
 /* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last
    bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the
    sum is not finite. */
@@ -381,6 +401,7 @@ static cyclotron_status cyclotron_attempt(cyclotron_solver *s, int stage)
             double correction[3] = { 0.0 };
             for (int i = 0; i < 3; ++i)
                 for (int j = 0; j < 3; ++j) correction[i] -= increment_jacobian[i * 3 + j] * delta[j];
+            if (!cyclotron_plausible(s, stage, increment)) return cyclotron_NO_CONVERGENCE;
             if (!cyclotron_advance(s, increment, correction)) return cyclotron_NOT_FINITE;
             cyclotron_remember(memory, y, iteration + 1);
             return cyclotron_OK;
@@ -833,6 +854,8 @@ static int cyclotron_block(cyclotron_solver *s, cyclotron_table *table, int most
         if ((++passes >= most || !(size < previous)) && !solved) return 0;
         previous = size;
     }
+    for (int stage = 0; stage < 1; ++stage)
+        if (!cyclotron_near_lanes(model[stage].y, s->x)) return 0;
     for (int i = 0; i < 3; ++i)
         if (!isfinite(x[i])) return 0;
     memcpy(s->x, x, sizeof x);
@@ -1137,19 +1160,26 @@ static void cyclotron_group_advance(cyclotron_lanes x[restrict 3], cyclotron_lan
     }
 }
 
-/* Members that failed, or whose state is not finite, keep the state before the step, and leave. How many stay. */
+/* Members that failed, or whose state is not near the one before the step or not finite, keep that one, and leave. How many
+   stay. */
 static int cyclotron_group_leave(cyclotron_group *group, cyclotron_lanes x[3], cyclotron_lanes carry[3],
     size_t remaining)
 {
-    cyclotron_lanes size = { 0.0 };
+    cyclotron_lanes moved = { 0.0 }, size = { 0.0 }, bad;
     int active = 0;
-    for (int i = 0; i < 3; ++i)
-        for (int lane = 0; lane < cyclotron_LANES; ++lane) size[lane] += fabs(group->x[i][lane]);
+    for (int i = 0; i < 3; ++i) {
+        cyclotron_EACH_LANE
+        for (int lane = 0; lane < cyclotron_LANES; ++lane) {
+            moved[lane] += fabs(group->x[i][lane] - x[i][lane]);
+            size[lane] += fabs(x[i][lane]);
+        }
+    }
+    for (int lane = 0; lane < cyclotron_LANES; ++lane) bad[lane] = moved[lane] <= 4.0 * size[lane] ? 0.0 : 1.0;
     for (int lane = 0; lane < cyclotron_LANES; ++lane) active += group->active[lane];
-    if (active == cyclotron_LANES && cyclotron_largest(size) < HUGE_VAL) return active;
+    if (active == cyclotron_LANES && !(cyclotron_largest(bad) > 0.0)) return active;
     active = 0;
     for (int lane = 0; lane < cyclotron_LANES; ++lane) {
-        group->active[lane] = group->active[lane] && isfinite(size[lane]);
+        group->active[lane] = group->active[lane] && !(bad[lane] > 0.0);
         active += group->active[lane];
         for (int i = 0; i < 3 && !group->active[lane]; ++i) {
             group->x[i][lane] = x[i][lane];

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 37294db43d53fd518081149f03627fa446c9c73861c044f8ae027d8e348bbde8
+ * body-sha256: ba0d4cbbe16154e4395cad925aff582dd07b522eb7de5170ec592b5d42e8cb2d
  */
 #include "engel_geodesics.h"
 
@@ -358,6 +358,26 @@ static void engel_geodesics_remember(engel_geodesics_memory *memory, const doubl
     if (memory->slow > memory->patience && memory->count >= 95) engel_geodesics_fit(memory);
 }
 
+/* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved by a point far
+   away, at another energy, that has nothing to do with it. */
+static int engel_geodesics_plausible(const engel_geodesics_solver *s, int stage, const double increment[4])
+{
+    double moved = 0.0, size = 0.0, field[4], end[4];
+    for (int i = 0; i < 4; ++i) {
+        moved += fabs(increment[i]);
+        size += fabs(s->x[i]);
+    }
+    if (moved <= 2.0 * size) return 1;
+    engel_geodesics_vector_field(&s->params, s->x, field);
+    for (int i = 0; i < 4; ++i) {
+        size += fabs(engel_geodesics_fractions[stage] * s->h * field[i]);
+        end[i] = s->x[i] + increment[i];
+    }
+    if (moved <= 2.0 * size) return 1;
+    const double before = engel_geodesics_hamiltonian(&s->params, s->x), after = engel_geodesics_hamiltonian(&s->params, end);
+    return fabs(after - before) <= 0.5 * (fabs(before) + fabs(after));
+}
+
 /* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last
    bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the
    sum is not finite. */
@@ -418,6 +438,7 @@ static engel_geodesics_status engel_geodesics_attempt(engel_geodesics_solver *s,
             double correction[4] = { 0.0 };
             for (int i = 0; i < 4; ++i)
                 for (int j = 0; j < 4; ++j) correction[i] -= increment_jacobian[i * 4 + j] * delta[j];
+            if (!engel_geodesics_plausible(s, stage, increment)) return engel_geodesics_NO_CONVERGENCE;
             if (!engel_geodesics_advance(s, increment, correction)) return engel_geodesics_NOT_FINITE;
             engel_geodesics_remember(memory, y, iteration + 1);
             return engel_geodesics_OK;
@@ -942,6 +963,8 @@ static int engel_geodesics_block(engel_geodesics_solver *s, engel_geodesics_tabl
         if ((++passes >= most || !(size < previous)) && !solved) return 0;
         previous = size;
     }
+    for (int stage = 0; stage < 1; ++stage)
+        if (!engel_geodesics_near_lanes(model[stage].y, s->x)) return 0;
     for (int i = 0; i < 4; ++i)
         if (!isfinite(x[i])) return 0;
     memcpy(s->x, x, sizeof x);
@@ -1246,19 +1269,26 @@ static void engel_geodesics_group_advance(engel_geodesics_lanes x[restrict 4], e
     }
 }
 
-/* Members that failed, or whose state is not finite, keep the state before the step, and leave. How many stay. */
+/* Members that failed, or whose state is not near the one before the step or not finite, keep that one, and leave. How many
+   stay. */
 static int engel_geodesics_group_leave(engel_geodesics_group *group, engel_geodesics_lanes x[4], engel_geodesics_lanes carry[4],
     size_t remaining)
 {
-    engel_geodesics_lanes size = { 0.0 };
+    engel_geodesics_lanes moved = { 0.0 }, size = { 0.0 }, bad;
     int active = 0;
-    for (int i = 0; i < 4; ++i)
-        for (int lane = 0; lane < engel_geodesics_LANES; ++lane) size[lane] += fabs(group->x[i][lane]);
+    for (int i = 0; i < 4; ++i) {
+        engel_geodesics_EACH_LANE
+        for (int lane = 0; lane < engel_geodesics_LANES; ++lane) {
+            moved[lane] += fabs(group->x[i][lane] - x[i][lane]);
+            size[lane] += fabs(x[i][lane]);
+        }
+    }
+    for (int lane = 0; lane < engel_geodesics_LANES; ++lane) bad[lane] = moved[lane] <= 4.0 * size[lane] ? 0.0 : 1.0;
     for (int lane = 0; lane < engel_geodesics_LANES; ++lane) active += group->active[lane];
-    if (active == engel_geodesics_LANES && engel_geodesics_largest(size) < HUGE_VAL) return active;
+    if (active == engel_geodesics_LANES && !(engel_geodesics_largest(bad) > 0.0)) return active;
     active = 0;
     for (int lane = 0; lane < engel_geodesics_LANES; ++lane) {
-        group->active[lane] = group->active[lane] && isfinite(size[lane]);
+        group->active[lane] = group->active[lane] && !(bad[lane] > 0.0);
         active += group->active[lane];
         for (int i = 0; i < 4 && !group->active[lane]; ++i) {
             group->x[i][lane] = x[i][lane];

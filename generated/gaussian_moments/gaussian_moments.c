@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 4c9c34a29099da8a8d89630c2c3ea0dbe4e3a46755a22ce1b8b16fb2e1de2b7f
+ * body-sha256: 681105543f2026c2f9d6657a9954f65de6e618b9c8eab93a5616a0a9bd36de91
  */
 #include "gaussian_moments.h"
 
@@ -472,6 +472,26 @@ static void gaussian_moments_remember(gaussian_moments_memory *memory, const dou
     if (memory->slow > memory->patience && memory->count >= 95) gaussian_moments_fit(memory);
 }
 
+/* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved by a point far
+   away, at another energy, that has nothing to do with it. */
+static int gaussian_moments_plausible(const gaussian_moments_solver *s, int stage, const double increment[3])
+{
+    double moved = 0.0, size = 0.0, field[3], end[3];
+    for (int i = 0; i < 3; ++i) {
+        moved += fabs(increment[i]);
+        size += fabs(s->x[i]);
+    }
+    if (moved <= 2.0 * size) return 1;
+    gaussian_moments_vector_field(&s->params, s->x, field);
+    for (int i = 0; i < 3; ++i) {
+        size += fabs(gaussian_moments_fractions[stage] * s->h * field[i]);
+        end[i] = s->x[i] + increment[i];
+    }
+    if (moved <= 2.0 * size) return 1;
+    const double before = gaussian_moments_hamiltonian(&s->params, s->x), after = gaussian_moments_hamiltonian(&s->params, end);
+    return fabs(after - before) <= 0.5 * (fabs(before) + fabs(after));
+}
+
 /* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last
    bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the
    sum is not finite. */
@@ -532,6 +552,7 @@ static gaussian_moments_status gaussian_moments_attempt(gaussian_moments_solver 
             double correction[3] = { 0.0 };
             for (int i = 0; i < 3; ++i)
                 for (int j = 0; j < 3; ++j) correction[i] -= increment_jacobian[i * 3 + j] * delta[j];
+            if (!gaussian_moments_plausible(s, stage, increment)) return gaussian_moments_NO_CONVERGENCE;
             if (!gaussian_moments_advance(s, increment, correction)) return gaussian_moments_NOT_FINITE;
             gaussian_moments_remember(memory, y, iteration + 1);
             return gaussian_moments_OK;
@@ -1077,6 +1098,8 @@ static int gaussian_moments_block(gaussian_moments_solver *s, gaussian_moments_t
         if ((++passes >= most || !(size < previous)) && !solved) return 0;
         previous = size;
     }
+    for (int stage = 0; stage < 1; ++stage)
+        if (!gaussian_moments_near_lanes(model[stage].y, s->x)) return 0;
     for (int i = 0; i < 3; ++i)
         if (!isfinite(x[i])) return 0;
     memcpy(s->x, x, sizeof x);
@@ -1381,19 +1404,26 @@ static void gaussian_moments_group_advance(gaussian_moments_lanes x[restrict 3],
     }
 }
 
-/* Members that failed, or whose state is not finite, keep the state before the step, and leave. How many stay. */
+/* Members that failed, or whose state is not near the one before the step or not finite, keep that one, and leave. How many
+   stay. */
 static int gaussian_moments_group_leave(gaussian_moments_group *group, gaussian_moments_lanes x[3], gaussian_moments_lanes carry[3],
     size_t remaining)
 {
-    gaussian_moments_lanes size = { 0.0 };
+    gaussian_moments_lanes moved = { 0.0 }, size = { 0.0 }, bad;
     int active = 0;
-    for (int i = 0; i < 3; ++i)
-        for (int lane = 0; lane < gaussian_moments_LANES; ++lane) size[lane] += fabs(group->x[i][lane]);
+    for (int i = 0; i < 3; ++i) {
+        gaussian_moments_EACH_LANE
+        for (int lane = 0; lane < gaussian_moments_LANES; ++lane) {
+            moved[lane] += fabs(group->x[i][lane] - x[i][lane]);
+            size[lane] += fabs(x[i][lane]);
+        }
+    }
+    for (int lane = 0; lane < gaussian_moments_LANES; ++lane) bad[lane] = moved[lane] <= 4.0 * size[lane] ? 0.0 : 1.0;
     for (int lane = 0; lane < gaussian_moments_LANES; ++lane) active += group->active[lane];
-    if (active == gaussian_moments_LANES && gaussian_moments_largest(size) < HUGE_VAL) return active;
+    if (active == gaussian_moments_LANES && !(gaussian_moments_largest(bad) > 0.0)) return active;
     active = 0;
     for (int lane = 0; lane < gaussian_moments_LANES; ++lane) {
-        group->active[lane] = group->active[lane] && isfinite(size[lane]);
+        group->active[lane] = group->active[lane] && !(bad[lane] > 0.0);
         active += group->active[lane];
         for (int i = 0; i < 3 && !group->active[lane]; ++i) {
             group->x[i][lane] = x[i][lane];

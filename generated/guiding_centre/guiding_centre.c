@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: ded5b381c3215d5806933527d1578b4161da4a8665c9b6af99a3348e6d875923
+ * body-sha256: 78c6f430ed09d9874a62fccdce5869dfae75721ea391e64358689fbf91ba83fb
  */
 #include "guiding_centre.h"
 
@@ -352,6 +352,26 @@ static void guiding_centre_remember(guiding_centre_memory *memory, const double 
     if (memory->slow > memory->patience && memory->count >= 95) guiding_centre_fit(memory);
 }
 
+/* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved by a point far
+   away, at another energy, that has nothing to do with it. */
+static int guiding_centre_plausible(const guiding_centre_solver *s, int stage, const double increment[4])
+{
+    double moved = 0.0, size = 0.0, field[4], end[4];
+    for (int i = 0; i < 4; ++i) {
+        moved += fabs(increment[i]);
+        size += fabs(s->x[i]);
+    }
+    if (moved <= 2.0 * size) return 1;
+    guiding_centre_vector_field(&s->params, s->x, field);
+    for (int i = 0; i < 4; ++i) {
+        size += fabs(guiding_centre_fractions[stage] * s->h * field[i]);
+        end[i] = s->x[i] + increment[i];
+    }
+    if (moved <= 2.0 * size) return 1;
+    const double before = guiding_centre_hamiltonian(&s->params, s->x), after = guiding_centre_hamiltonian(&s->params, end);
+    return fabs(after - before) <= 0.5 * (fabs(before) + fabs(after));
+}
+
 /* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last
    bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the
    sum is not finite. */
@@ -663,6 +683,7 @@ static guiding_centre_status guiding_centre_attempt(guiding_centre_solver *s, in
         size /= norm;
         /* The second test: residuals no longer shrink, the solve has reached the level of rounding. */
         if (size <= 4e-16 || (previous < 1e-12 && size > 0.25 * previous)) {
+            if (!guiding_centre_plausible(s, stage, change)) return guiding_centre_NO_CONVERGENCE;
             if (!guiding_centre_advance(s, change, none)) return guiding_centre_NOT_FINITE;
             guiding_centre_remember(memory, y, iteration);
             return guiding_centre_OK;
@@ -2586,6 +2607,8 @@ static int guiding_centre_block(guiding_centre_solver *s, guiding_centre_table *
         if ((++passes >= most || !(size < previous)) && !solved) return 0;
         previous = size;
     }
+    for (int stage = 0; stage < 5; ++stage)
+        if (!guiding_centre_near_lanes(model[stage].y, s->x)) return 0;
     for (int i = 0; i < 4; ++i)
         if (!isfinite(x[i])) return 0;
     memcpy(s->x, x, sizeof x);

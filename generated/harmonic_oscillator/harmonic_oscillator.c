@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 61619071b211b268aeb3cc2cf621664094bd9f76c27302f38587d7ecbadae6eb
+ * body-sha256: bebf9c44d1e077e43b00bbfe2a66c911da0ebe1d84ca9c0a55ccc29104cf2a8c
  */
 #include "harmonic_oscillator.h"
 
@@ -303,6 +303,26 @@ static void harmonic_oscillator_remember(harmonic_oscillator_memory *memory, con
     if (memory->slow > memory->patience && memory->count >= 95) harmonic_oscillator_fit(memory);
 }
 
+/* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved by a point far
+   away, at another energy, that has nothing to do with it. */
+static int harmonic_oscillator_plausible(const harmonic_oscillator_solver *s, int stage, const double increment[2])
+{
+    double moved = 0.0, size = 0.0, field[2], end[2];
+    for (int i = 0; i < 2; ++i) {
+        moved += fabs(increment[i]);
+        size += fabs(s->x[i]);
+    }
+    if (moved <= 2.0 * size) return 1;
+    harmonic_oscillator_vector_field(&s->params, s->x, field);
+    for (int i = 0; i < 2; ++i) {
+        size += fabs(harmonic_oscillator_fractions[stage] * s->h * field[i]);
+        end[i] = s->x[i] + increment[i];
+    }
+    if (moved <= 2.0 * size) return 1;
+    const double before = harmonic_oscillator_hamiltonian(&s->params, s->x), after = harmonic_oscillator_hamiltonian(&s->params, end);
+    return fabs(after - before) <= 0.5 * (fabs(before) + fabs(after));
+}
+
 /* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last
    bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the
    sum is not finite. */
@@ -363,6 +383,7 @@ static harmonic_oscillator_status harmonic_oscillator_attempt(harmonic_oscillato
             double correction[2] = { 0.0 };
             for (int i = 0; i < 2; ++i)
                 for (int j = 0; j < 2; ++j) correction[i] -= increment_jacobian[i * 2 + j] * delta[j];
+            if (!harmonic_oscillator_plausible(s, stage, increment)) return harmonic_oscillator_NO_CONVERGENCE;
             if (!harmonic_oscillator_advance(s, increment, correction)) return harmonic_oscillator_NOT_FINITE;
             harmonic_oscillator_remember(memory, y, iteration + 1);
             return harmonic_oscillator_OK;
@@ -774,6 +795,8 @@ static int harmonic_oscillator_block(harmonic_oscillator_solver *s, harmonic_osc
         if ((++passes >= most || !(size < previous)) && !solved) return 0;
         previous = size;
     }
+    for (int stage = 0; stage < 1; ++stage)
+        if (!harmonic_oscillator_near_lanes(model[stage].y, s->x)) return 0;
     for (int i = 0; i < 2; ++i)
         if (!isfinite(x[i])) return 0;
     memcpy(s->x, x, sizeof x);
@@ -1078,19 +1101,26 @@ static void harmonic_oscillator_group_advance(harmonic_oscillator_lanes x[restri
     }
 }
 
-/* Members that failed, or whose state is not finite, keep the state before the step, and leave. How many stay. */
+/* Members that failed, or whose state is not near the one before the step or not finite, keep that one, and leave. How many
+   stay. */
 static int harmonic_oscillator_group_leave(harmonic_oscillator_group *group, harmonic_oscillator_lanes x[2], harmonic_oscillator_lanes carry[2],
     size_t remaining)
 {
-    harmonic_oscillator_lanes size = { 0.0 };
+    harmonic_oscillator_lanes moved = { 0.0 }, size = { 0.0 }, bad;
     int active = 0;
-    for (int i = 0; i < 2; ++i)
-        for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane) size[lane] += fabs(group->x[i][lane]);
+    for (int i = 0; i < 2; ++i) {
+        harmonic_oscillator_EACH_LANE
+        for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane) {
+            moved[lane] += fabs(group->x[i][lane] - x[i][lane]);
+            size[lane] += fabs(x[i][lane]);
+        }
+    }
+    for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane) bad[lane] = moved[lane] <= 4.0 * size[lane] ? 0.0 : 1.0;
     for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane) active += group->active[lane];
-    if (active == harmonic_oscillator_LANES && harmonic_oscillator_largest(size) < HUGE_VAL) return active;
+    if (active == harmonic_oscillator_LANES && !(harmonic_oscillator_largest(bad) > 0.0)) return active;
     active = 0;
     for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane) {
-        group->active[lane] = group->active[lane] && isfinite(size[lane]);
+        group->active[lane] = group->active[lane] && !(bad[lane] > 0.0);
         active += group->active[lane];
         for (int i = 0; i < 2 && !group->active[lane]; ++i) {
             group->x[i][lane] = x[i][lane];

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 7fc5ec5affe83e2bf438bd048eda3e22fbe3986a87739fc0b17e3f238d9895a4
+ * body-sha256: fd2365ba58630e203ec11dfc3e2ed2920e1c26bf03534f4d73eb2636e8954b75
  */
 #include "henon_heiles.h"
 
@@ -407,6 +407,26 @@ static void henon_heiles_remember(henon_heiles_memory *memory, const double valu
     if (memory->slow > memory->patience && memory->count >= 95) henon_heiles_fit(memory);
 }
 
+/* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved by a point far
+   away, at another energy, that has nothing to do with it. */
+static int henon_heiles_plausible(const henon_heiles_solver *s, int stage, const double increment[4])
+{
+    double moved = 0.0, size = 0.0, field[4], end[4];
+    for (int i = 0; i < 4; ++i) {
+        moved += fabs(increment[i]);
+        size += fabs(s->x[i]);
+    }
+    if (moved <= 2.0 * size) return 1;
+    henon_heiles_vector_field(&s->params, s->x, field);
+    for (int i = 0; i < 4; ++i) {
+        size += fabs(henon_heiles_fractions[stage] * s->h * field[i]);
+        end[i] = s->x[i] + increment[i];
+    }
+    if (moved <= 2.0 * size) return 1;
+    const double before = henon_heiles_hamiltonian(&s->params, s->x), after = henon_heiles_hamiltonian(&s->params, end);
+    return fabs(after - before) <= 0.5 * (fabs(before) + fabs(after));
+}
+
 /* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last
    bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the
    sum is not finite. */
@@ -467,6 +487,7 @@ static henon_heiles_status henon_heiles_attempt(henon_heiles_solver *s, int stag
             double correction[4] = { 0.0 };
             for (int i = 0; i < 4; ++i)
                 for (int j = 0; j < 4; ++j) correction[i] -= increment_jacobian[i * 4 + j] * delta[j];
+            if (!henon_heiles_plausible(s, stage, increment)) return henon_heiles_NO_CONVERGENCE;
             if (!henon_heiles_advance(s, increment, correction)) return henon_heiles_NOT_FINITE;
             henon_heiles_remember(memory, y, iteration + 1);
             return henon_heiles_OK;
@@ -1006,6 +1027,8 @@ static int henon_heiles_block(henon_heiles_solver *s, henon_heiles_table *table,
         if ((++passes >= most || !(size < previous)) && !solved) return 0;
         previous = size;
     }
+    for (int stage = 0; stage < 1; ++stage)
+        if (!henon_heiles_near_lanes(model[stage].y, s->x)) return 0;
     for (int i = 0; i < 4; ++i)
         if (!isfinite(x[i])) return 0;
     memcpy(s->x, x, sizeof x);
@@ -1310,19 +1333,26 @@ static void henon_heiles_group_advance(henon_heiles_lanes x[restrict 4], henon_h
     }
 }
 
-/* Members that failed, or whose state is not finite, keep the state before the step, and leave. How many stay. */
+/* Members that failed, or whose state is not near the one before the step or not finite, keep that one, and leave. How many
+   stay. */
 static int henon_heiles_group_leave(henon_heiles_group *group, henon_heiles_lanes x[4], henon_heiles_lanes carry[4],
     size_t remaining)
 {
-    henon_heiles_lanes size = { 0.0 };
+    henon_heiles_lanes moved = { 0.0 }, size = { 0.0 }, bad;
     int active = 0;
-    for (int i = 0; i < 4; ++i)
-        for (int lane = 0; lane < henon_heiles_LANES; ++lane) size[lane] += fabs(group->x[i][lane]);
+    for (int i = 0; i < 4; ++i) {
+        henon_heiles_EACH_LANE
+        for (int lane = 0; lane < henon_heiles_LANES; ++lane) {
+            moved[lane] += fabs(group->x[i][lane] - x[i][lane]);
+            size[lane] += fabs(x[i][lane]);
+        }
+    }
+    for (int lane = 0; lane < henon_heiles_LANES; ++lane) bad[lane] = moved[lane] <= 4.0 * size[lane] ? 0.0 : 1.0;
     for (int lane = 0; lane < henon_heiles_LANES; ++lane) active += group->active[lane];
-    if (active == henon_heiles_LANES && henon_heiles_largest(size) < HUGE_VAL) return active;
+    if (active == henon_heiles_LANES && !(henon_heiles_largest(bad) > 0.0)) return active;
     active = 0;
     for (int lane = 0; lane < henon_heiles_LANES; ++lane) {
-        group->active[lane] = group->active[lane] && isfinite(size[lane]);
+        group->active[lane] = group->active[lane] && !(bad[lane] > 0.0);
         active += group->active[lane];
         for (int i = 0; i < 4 && !group->active[lane]; ++i) {
             group->x[i][lane] = x[i][lane];

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: cc1bc34f5e6bac0172df3534452bd585ddeb1bf0879ccb7043ce42901ac03965
+ * body-sha256: 7724322a290a1ed50af451126bef8c04c13b4f4c4024db39e25643cd3530701f
  */
 #include "kepler.h"
 
@@ -718,6 +718,26 @@ static void kepler_remember(kepler_memory *memory, const double value[4], int it
     if (memory->slow > memory->patience && memory->count >= 95) kepler_fit(memory);
 }
 
+/* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved by a point far
+   away, at another energy, that has nothing to do with it. */
+static int kepler_plausible(const kepler_solver *s, int stage, const double increment[4])
+{
+    double moved = 0.0, size = 0.0, field[4], end[4];
+    for (int i = 0; i < 4; ++i) {
+        moved += fabs(increment[i]);
+        size += fabs(s->x[i]);
+    }
+    if (moved <= 2.0 * size) return 1;
+    kepler_vector_field(&s->params, s->x, field);
+    for (int i = 0; i < 4; ++i) {
+        size += fabs(kepler_fractions[stage] * s->h * field[i]);
+        end[i] = s->x[i] + increment[i];
+    }
+    if (moved <= 2.0 * size) return 1;
+    const double before = kepler_hamiltonian(&s->params, s->x), after = kepler_hamiltonian(&s->params, end);
+    return fabs(after - before) <= 0.5 * (fabs(before) + fabs(after));
+}
+
 /* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last
    bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the
    sum is not finite. */
@@ -778,6 +798,7 @@ static kepler_status kepler_attempt(kepler_solver *s, int stage)
             double correction[4] = { 0.0 };
             for (int i = 0; i < 4; ++i)
                 for (int j = 0; j < 4; ++j) correction[i] -= increment_jacobian[i * 4 + j] * delta[j];
+            if (!kepler_plausible(s, stage, increment)) return kepler_NO_CONVERGENCE;
             if (!kepler_advance(s, increment, correction)) return kepler_NOT_FINITE;
             kepler_remember(memory, y, iteration + 1);
             return kepler_OK;
@@ -1528,6 +1549,8 @@ static int kepler_block(kepler_solver *s, kepler_table *table, int most)
         if ((++passes >= most || !(size < previous)) && !solved) return 0;
         previous = size;
     }
+    for (int stage = 0; stage < 1; ++stage)
+        if (!kepler_near_lanes(model[stage].y, s->x)) return 0;
     for (int i = 0; i < 4; ++i)
         if (!isfinite(x[i])) return 0;
     memcpy(s->x, x, sizeof x);
@@ -1832,19 +1855,26 @@ static void kepler_group_advance(kepler_lanes x[restrict 4], kepler_lanes carry[
     }
 }
 
-/* Members that failed, or whose state is not finite, keep the state before the step, and leave. How many stay. */
+/* Members that failed, or whose state is not near the one before the step or not finite, keep that one, and leave. How many
+   stay. */
 static int kepler_group_leave(kepler_group *group, kepler_lanes x[4], kepler_lanes carry[4],
     size_t remaining)
 {
-    kepler_lanes size = { 0.0 };
+    kepler_lanes moved = { 0.0 }, size = { 0.0 }, bad;
     int active = 0;
-    for (int i = 0; i < 4; ++i)
-        for (int lane = 0; lane < kepler_LANES; ++lane) size[lane] += fabs(group->x[i][lane]);
+    for (int i = 0; i < 4; ++i) {
+        kepler_EACH_LANE
+        for (int lane = 0; lane < kepler_LANES; ++lane) {
+            moved[lane] += fabs(group->x[i][lane] - x[i][lane]);
+            size[lane] += fabs(x[i][lane]);
+        }
+    }
+    for (int lane = 0; lane < kepler_LANES; ++lane) bad[lane] = moved[lane] <= 4.0 * size[lane] ? 0.0 : 1.0;
     for (int lane = 0; lane < kepler_LANES; ++lane) active += group->active[lane];
-    if (active == kepler_LANES && kepler_largest(size) < HUGE_VAL) return active;
+    if (active == kepler_LANES && !(kepler_largest(bad) > 0.0)) return active;
     active = 0;
     for (int lane = 0; lane < kepler_LANES; ++lane) {
-        group->active[lane] = group->active[lane] && isfinite(size[lane]);
+        group->active[lane] = group->active[lane] && !(bad[lane] > 0.0);
         active += group->active[lane];
         for (int i = 0; i < 4 && !group->active[lane]; ++i) {
             group->x[i][lane] = x[i][lane];

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: a6a9b577af248045e15687ca52045ba28b59a7d29a3fc39e4db52981d6ea3eb6
+ * body-sha256: 78277745a8cbddc644f389d26767c9d56ecb60e82de1dd84e9e9fabe2a148082
  */
 #include "kowalevski_top.h"
 
@@ -1231,6 +1231,26 @@ static void kowalevski_top_remember(kowalevski_top_memory *memory, const double 
     if (memory->slow > memory->patience && memory->count >= 95) kowalevski_top_fit(memory);
 }
 
+/* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved by a point far
+   away, at another energy, that has nothing to do with it. */
+static int kowalevski_top_plausible(const kowalevski_top_solver *s, int stage, const double increment[6])
+{
+    double moved = 0.0, size = 0.0, field[6], end[6];
+    for (int i = 0; i < 6; ++i) {
+        moved += fabs(increment[i]);
+        size += fabs(s->x[i]);
+    }
+    if (moved <= 2.0 * size) return 1;
+    kowalevski_top_vector_field(&s->params, s->x, field);
+    for (int i = 0; i < 6; ++i) {
+        size += fabs(kowalevski_top_fractions[stage] * s->h * field[i]);
+        end[i] = s->x[i] + increment[i];
+    }
+    if (moved <= 2.0 * size) return 1;
+    const double before = kowalevski_top_hamiltonian(&s->params, s->x), after = kowalevski_top_hamiltonian(&s->params, end);
+    return fabs(after - before) <= 0.5 * (fabs(before) + fabs(after));
+}
+
 /* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last
    bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the
    sum is not finite. */
@@ -1291,6 +1311,7 @@ static kowalevski_top_status kowalevski_top_attempt(kowalevski_top_solver *s, in
             double correction[6] = { 0.0 };
             for (int i = 0; i < 6; ++i)
                 for (int j = 0; j < 6; ++j) correction[i] -= increment_jacobian[i * 6 + j] * delta[j];
+            if (!kowalevski_top_plausible(s, stage, increment)) return kowalevski_top_NO_CONVERGENCE;
             if (!kowalevski_top_advance(s, increment, correction)) return kowalevski_top_NOT_FINITE;
             kowalevski_top_remember(memory, y, iteration + 1);
             return kowalevski_top_OK;
@@ -2532,6 +2553,8 @@ static int kowalevski_top_block(kowalevski_top_solver *s, kowalevski_top_table *
         if ((++passes >= most || !(size < previous)) && !solved) return 0;
         previous = size;
     }
+    for (int stage = 0; stage < 1; ++stage)
+        if (!kowalevski_top_near_lanes(model[stage].y, s->x)) return 0;
     for (int i = 0; i < 6; ++i)
         if (!isfinite(x[i])) return 0;
     memcpy(s->x, x, sizeof x);
@@ -2836,19 +2859,26 @@ static void kowalevski_top_group_advance(kowalevski_top_lanes x[restrict 6], kow
     }
 }
 
-/* Members that failed, or whose state is not finite, keep the state before the step, and leave. How many stay. */
+/* Members that failed, or whose state is not near the one before the step or not finite, keep that one, and leave. How many
+   stay. */
 static int kowalevski_top_group_leave(kowalevski_top_group *group, kowalevski_top_lanes x[6], kowalevski_top_lanes carry[6],
     size_t remaining)
 {
-    kowalevski_top_lanes size = { 0.0 };
+    kowalevski_top_lanes moved = { 0.0 }, size = { 0.0 }, bad;
     int active = 0;
-    for (int i = 0; i < 6; ++i)
-        for (int lane = 0; lane < kowalevski_top_LANES; ++lane) size[lane] += fabs(group->x[i][lane]);
+    for (int i = 0; i < 6; ++i) {
+        kowalevski_top_EACH_LANE
+        for (int lane = 0; lane < kowalevski_top_LANES; ++lane) {
+            moved[lane] += fabs(group->x[i][lane] - x[i][lane]);
+            size[lane] += fabs(x[i][lane]);
+        }
+    }
+    for (int lane = 0; lane < kowalevski_top_LANES; ++lane) bad[lane] = moved[lane] <= 4.0 * size[lane] ? 0.0 : 1.0;
     for (int lane = 0; lane < kowalevski_top_LANES; ++lane) active += group->active[lane];
-    if (active == kowalevski_top_LANES && kowalevski_top_largest(size) < HUGE_VAL) return active;
+    if (active == kowalevski_top_LANES && !(kowalevski_top_largest(bad) > 0.0)) return active;
     active = 0;
     for (int lane = 0; lane < kowalevski_top_LANES; ++lane) {
-        group->active[lane] = group->active[lane] && isfinite(size[lane]);
+        group->active[lane] = group->active[lane] && !(bad[lane] > 0.0);
         active += group->active[lane];
         for (int i = 0; i < 6 && !group->active[lane]; ++i) {
             group->x[i][lane] = x[i][lane];

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: f4f729ba9c30fb58f218d53ca05eae8ed5c396aa1587bf18af2f723f0b0c7018
+ * body-sha256: 279dcf51811940fab34588b56f2ea9460ee87caeee38293f5b03a045b2fe5e92
  */
 #include "lagrange_top.h"
 
@@ -825,6 +825,26 @@ static void lagrange_top_remember(lagrange_top_memory *memory, const double valu
     if (memory->slow > memory->patience && memory->count >= 95) lagrange_top_fit(memory);
 }
 
+/* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved by a point far
+   away, at another energy, that has nothing to do with it. */
+static int lagrange_top_plausible(const lagrange_top_solver *s, int stage, const double increment[6])
+{
+    double moved = 0.0, size = 0.0, field[6], end[6];
+    for (int i = 0; i < 6; ++i) {
+        moved += fabs(increment[i]);
+        size += fabs(s->x[i]);
+    }
+    if (moved <= 2.0 * size) return 1;
+    lagrange_top_vector_field(&s->params, s->x, field);
+    for (int i = 0; i < 6; ++i) {
+        size += fabs(lagrange_top_fractions[stage] * s->h * field[i]);
+        end[i] = s->x[i] + increment[i];
+    }
+    if (moved <= 2.0 * size) return 1;
+    const double before = lagrange_top_hamiltonian(&s->params, s->x), after = lagrange_top_hamiltonian(&s->params, end);
+    return fabs(after - before) <= 0.5 * (fabs(before) + fabs(after));
+}
+
 /* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last
    bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the
    sum is not finite. */
@@ -885,6 +905,7 @@ static lagrange_top_status lagrange_top_attempt(lagrange_top_solver *s, int stag
             double correction[6] = { 0.0 };
             for (int i = 0; i < 6; ++i)
                 for (int j = 0; j < 6; ++j) correction[i] -= increment_jacobian[i * 6 + j] * delta[j];
+            if (!lagrange_top_plausible(s, stage, increment)) return lagrange_top_NO_CONVERGENCE;
             if (!lagrange_top_advance(s, increment, correction)) return lagrange_top_NOT_FINITE;
             lagrange_top_remember(memory, y, iteration + 1);
             return lagrange_top_OK;
@@ -1807,6 +1828,8 @@ static int lagrange_top_block(lagrange_top_solver *s, lagrange_top_table *table,
         if ((++passes >= most || !(size < previous)) && !solved) return 0;
         previous = size;
     }
+    for (int stage = 0; stage < 1; ++stage)
+        if (!lagrange_top_near_lanes(model[stage].y, s->x)) return 0;
     for (int i = 0; i < 6; ++i)
         if (!isfinite(x[i])) return 0;
     memcpy(s->x, x, sizeof x);
@@ -2111,19 +2134,26 @@ static void lagrange_top_group_advance(lagrange_top_lanes x[restrict 6], lagrang
     }
 }
 
-/* Members that failed, or whose state is not finite, keep the state before the step, and leave. How many stay. */
+/* Members that failed, or whose state is not near the one before the step or not finite, keep that one, and leave. How many
+   stay. */
 static int lagrange_top_group_leave(lagrange_top_group *group, lagrange_top_lanes x[6], lagrange_top_lanes carry[6],
     size_t remaining)
 {
-    lagrange_top_lanes size = { 0.0 };
+    lagrange_top_lanes moved = { 0.0 }, size = { 0.0 }, bad;
     int active = 0;
-    for (int i = 0; i < 6; ++i)
-        for (int lane = 0; lane < lagrange_top_LANES; ++lane) size[lane] += fabs(group->x[i][lane]);
+    for (int i = 0; i < 6; ++i) {
+        lagrange_top_EACH_LANE
+        for (int lane = 0; lane < lagrange_top_LANES; ++lane) {
+            moved[lane] += fabs(group->x[i][lane] - x[i][lane]);
+            size[lane] += fabs(x[i][lane]);
+        }
+    }
+    for (int lane = 0; lane < lagrange_top_LANES; ++lane) bad[lane] = moved[lane] <= 4.0 * size[lane] ? 0.0 : 1.0;
     for (int lane = 0; lane < lagrange_top_LANES; ++lane) active += group->active[lane];
-    if (active == lagrange_top_LANES && lagrange_top_largest(size) < HUGE_VAL) return active;
+    if (active == lagrange_top_LANES && !(lagrange_top_largest(bad) > 0.0)) return active;
     active = 0;
     for (int lane = 0; lane < lagrange_top_LANES; ++lane) {
-        group->active[lane] = group->active[lane] && isfinite(size[lane]);
+        group->active[lane] = group->active[lane] && !(bad[lane] > 0.0);
         active += group->active[lane];
         for (int i = 0; i < 6 && !group->active[lane]; ++i) {
             group->x[i][lane] = x[i][lane];

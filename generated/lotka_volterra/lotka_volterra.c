@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 5d0aca4a92004b412b5378a0d5955f9758e7cba39cda67c9dde50e2520b5778b
+ * body-sha256: b1243b4f2ec2f77ce81b42769af225e9868872e4dbaf40b154b4a14f948221fa
  */
 #include "lotka_volterra.h"
 
@@ -342,6 +342,26 @@ static void lotka_volterra_remember(lotka_volterra_memory *memory, const double 
     if (memory->slow > memory->patience && memory->count >= 95) lotka_volterra_fit(memory);
 }
 
+/* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved by a point far
+   away, at another energy, that has nothing to do with it. */
+static int lotka_volterra_plausible(const lotka_volterra_solver *s, int stage, const double increment[3])
+{
+    double moved = 0.0, size = 0.0, field[3], end[3];
+    for (int i = 0; i < 3; ++i) {
+        moved += fabs(increment[i]);
+        size += fabs(s->x[i]);
+    }
+    if (moved <= 2.0 * size) return 1;
+    lotka_volterra_vector_field(&s->params, s->x, field);
+    for (int i = 0; i < 3; ++i) {
+        size += fabs(lotka_volterra_fractions[stage] * s->h * field[i]);
+        end[i] = s->x[i] + increment[i];
+    }
+    if (moved <= 2.0 * size) return 1;
+    const double before = lotka_volterra_hamiltonian(&s->params, s->x), after = lotka_volterra_hamiltonian(&s->params, end);
+    return fabs(after - before) <= 0.5 * (fabs(before) + fabs(after));
+}
+
 /* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last
    bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the
    sum is not finite. */
@@ -401,6 +421,7 @@ static lotka_volterra_status lotka_volterra_attempt(lotka_volterra_solver *s, in
             double correction[3] = { 0.0 };
             for (int i = 0; i < 3; ++i)
                 for (int j = 0; j < 3; ++j) correction[i] -= increment_jacobian[i * 3 + j] * delta[j];
+            if (!lotka_volterra_plausible(s, stage, increment)) return lotka_volterra_NO_CONVERGENCE;
             if (!lotka_volterra_advance(s, increment, correction)) return lotka_volterra_NOT_FINITE;
             lotka_volterra_remember(memory, y, iteration + 1);
             return lotka_volterra_OK;
@@ -904,6 +925,8 @@ static int lotka_volterra_block(lotka_volterra_solver *s, lotka_volterra_table *
         if ((++passes >= most || !(size < previous)) && !solved) return 0;
         previous = size;
     }
+    for (int stage = 0; stage < 1; ++stage)
+        if (!lotka_volterra_near_lanes(model[stage].y, s->x)) return 0;
     for (int i = 0; i < 3; ++i)
         if (!isfinite(x[i])) return 0;
     memcpy(s->x, x, sizeof x);
@@ -1208,19 +1231,26 @@ static void lotka_volterra_group_advance(lotka_volterra_lanes x[restrict 3], lot
     }
 }
 
-/* Members that failed, or whose state is not finite, keep the state before the step, and leave. How many stay. */
+/* Members that failed, or whose state is not near the one before the step or not finite, keep that one, and leave. How many
+   stay. */
 static int lotka_volterra_group_leave(lotka_volterra_group *group, lotka_volterra_lanes x[3], lotka_volterra_lanes carry[3],
     size_t remaining)
 {
-    lotka_volterra_lanes size = { 0.0 };
+    lotka_volterra_lanes moved = { 0.0 }, size = { 0.0 }, bad;
     int active = 0;
-    for (int i = 0; i < 3; ++i)
-        for (int lane = 0; lane < lotka_volterra_LANES; ++lane) size[lane] += fabs(group->x[i][lane]);
+    for (int i = 0; i < 3; ++i) {
+        lotka_volterra_EACH_LANE
+        for (int lane = 0; lane < lotka_volterra_LANES; ++lane) {
+            moved[lane] += fabs(group->x[i][lane] - x[i][lane]);
+            size[lane] += fabs(x[i][lane]);
+        }
+    }
+    for (int lane = 0; lane < lotka_volterra_LANES; ++lane) bad[lane] = moved[lane] <= 4.0 * size[lane] ? 0.0 : 1.0;
     for (int lane = 0; lane < lotka_volterra_LANES; ++lane) active += group->active[lane];
-    if (active == lotka_volterra_LANES && lotka_volterra_largest(size) < HUGE_VAL) return active;
+    if (active == lotka_volterra_LANES && !(lotka_volterra_largest(bad) > 0.0)) return active;
     active = 0;
     for (int lane = 0; lane < lotka_volterra_LANES; ++lane) {
-        group->active[lane] = group->active[lane] && isfinite(size[lane]);
+        group->active[lane] = group->active[lane] && !(bad[lane] > 0.0);
         active += group->active[lane];
         for (int i = 0; i < 3 && !group->active[lane]; ++i) {
             group->x[i][lane] = x[i][lane];

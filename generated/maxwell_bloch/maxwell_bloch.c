@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 1ecc5fcbfab32a94144d49c78b81335c3fb11e8e6c080abaff277d186a7edb08
+ * body-sha256: 30d3e56a03ab7ad6415b0ad12399feca99eecdf5f797d76fa38dd379f58bf689
  */
 #include "maxwell_bloch.h"
 
@@ -330,6 +330,26 @@ static void maxwell_bloch_remember(maxwell_bloch_memory *memory, const double va
     if (memory->slow > memory->patience && memory->count >= 95) maxwell_bloch_fit(memory);
 }
 
+/* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved by a point far
+   away, at another energy, that has nothing to do with it. */
+static int maxwell_bloch_plausible(const maxwell_bloch_solver *s, int stage, const double increment[3])
+{
+    double moved = 0.0, size = 0.0, field[3], end[3];
+    for (int i = 0; i < 3; ++i) {
+        moved += fabs(increment[i]);
+        size += fabs(s->x[i]);
+    }
+    if (moved <= 2.0 * size) return 1;
+    maxwell_bloch_vector_field(&s->params, s->x, field);
+    for (int i = 0; i < 3; ++i) {
+        size += fabs(maxwell_bloch_fractions[stage] * s->h * field[i]);
+        end[i] = s->x[i] + increment[i];
+    }
+    if (moved <= 2.0 * size) return 1;
+    const double before = maxwell_bloch_hamiltonian(&s->params, s->x), after = maxwell_bloch_hamiltonian(&s->params, end);
+    return fabs(after - before) <= 0.5 * (fabs(before) + fabs(after));
+}
+
 /* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last
    bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the
    sum is not finite. */
@@ -390,6 +410,7 @@ static maxwell_bloch_status maxwell_bloch_attempt(maxwell_bloch_solver *s, int s
             double correction[3] = { 0.0 };
             for (int i = 0; i < 3; ++i)
                 for (int j = 0; j < 3; ++j) correction[i] -= increment_jacobian[i * 3 + j] * delta[j];
+            if (!maxwell_bloch_plausible(s, stage, increment)) return maxwell_bloch_NO_CONVERGENCE;
             if (!maxwell_bloch_advance(s, increment, correction)) return maxwell_bloch_NOT_FINITE;
             maxwell_bloch_remember(memory, y, iteration + 1);
             return maxwell_bloch_OK;
@@ -854,6 +875,8 @@ static int maxwell_bloch_block(maxwell_bloch_solver *s, maxwell_bloch_table *tab
         if ((++passes >= most || !(size < previous)) && !solved) return 0;
         previous = size;
     }
+    for (int stage = 0; stage < 1; ++stage)
+        if (!maxwell_bloch_near_lanes(model[stage].y, s->x)) return 0;
     for (int i = 0; i < 3; ++i)
         if (!isfinite(x[i])) return 0;
     memcpy(s->x, x, sizeof x);
@@ -1158,19 +1181,26 @@ static void maxwell_bloch_group_advance(maxwell_bloch_lanes x[restrict 3], maxwe
     }
 }
 
-/* Members that failed, or whose state is not finite, keep the state before the step, and leave. How many stay. */
+/* Members that failed, or whose state is not near the one before the step or not finite, keep that one, and leave. How many
+   stay. */
 static int maxwell_bloch_group_leave(maxwell_bloch_group *group, maxwell_bloch_lanes x[3], maxwell_bloch_lanes carry[3],
     size_t remaining)
 {
-    maxwell_bloch_lanes size = { 0.0 };
+    maxwell_bloch_lanes moved = { 0.0 }, size = { 0.0 }, bad;
     int active = 0;
-    for (int i = 0; i < 3; ++i)
-        for (int lane = 0; lane < maxwell_bloch_LANES; ++lane) size[lane] += fabs(group->x[i][lane]);
+    for (int i = 0; i < 3; ++i) {
+        maxwell_bloch_EACH_LANE
+        for (int lane = 0; lane < maxwell_bloch_LANES; ++lane) {
+            moved[lane] += fabs(group->x[i][lane] - x[i][lane]);
+            size[lane] += fabs(x[i][lane]);
+        }
+    }
+    for (int lane = 0; lane < maxwell_bloch_LANES; ++lane) bad[lane] = moved[lane] <= 4.0 * size[lane] ? 0.0 : 1.0;
     for (int lane = 0; lane < maxwell_bloch_LANES; ++lane) active += group->active[lane];
-    if (active == maxwell_bloch_LANES && maxwell_bloch_largest(size) < HUGE_VAL) return active;
+    if (active == maxwell_bloch_LANES && !(maxwell_bloch_largest(bad) > 0.0)) return active;
     active = 0;
     for (int lane = 0; lane < maxwell_bloch_LANES; ++lane) {
-        group->active[lane] = group->active[lane] && isfinite(size[lane]);
+        group->active[lane] = group->active[lane] && !(bad[lane] > 0.0);
         active += group->active[lane];
         for (int i = 0; i < 3 && !group->active[lane]; ++i) {
             group->x[i][lane] = x[i][lane];

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 17962570e26270f7039f53530ac65056067975aee9c68bf7182f753e35c3ca0e
+ * body-sha256: e42ca9d4218d821c939ed1f8249759e5fbd43622b1a4391955194715c5306af1
  */
 #include "nambu_pendulum.h"
 
@@ -303,6 +303,26 @@ static void nambu_pendulum_remember(nambu_pendulum_memory *memory, const double 
     if (memory->slow > memory->patience && memory->count >= 95) nambu_pendulum_fit(memory);
 }
 
+/* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved by a point far
+   away, at another energy, that has nothing to do with it. */
+static int nambu_pendulum_plausible(const nambu_pendulum_solver *s, int stage, const double increment[3])
+{
+    double moved = 0.0, size = 0.0, field[3], end[3];
+    for (int i = 0; i < 3; ++i) {
+        moved += fabs(increment[i]);
+        size += fabs(s->x[i]);
+    }
+    if (moved <= 2.0 * size) return 1;
+    nambu_pendulum_vector_field(&s->params, s->x, field);
+    for (int i = 0; i < 3; ++i) {
+        size += fabs(nambu_pendulum_fractions[stage] * s->h * field[i]);
+        end[i] = s->x[i] + increment[i];
+    }
+    if (moved <= 2.0 * size) return 1;
+    const double before = nambu_pendulum_hamiltonian(&s->params, s->x), after = nambu_pendulum_hamiltonian(&s->params, end);
+    return fabs(after - before) <= 0.5 * (fabs(before) + fabs(after));
+}
+
 /* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last
    bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the
    sum is not finite. */
@@ -477,6 +497,7 @@ static nambu_pendulum_status nambu_pendulum_attempt(nambu_pendulum_solver *s, in
         size /= norm;
         /* The second test: residuals no longer shrink, the solve has reached the level of rounding. */
         if (size <= 4e-16 || (previous < 1e-12 && size > 0.25 * previous)) {
+            if (!nambu_pendulum_plausible(s, stage, change)) return nambu_pendulum_NO_CONVERGENCE;
             if (!nambu_pendulum_advance(s, change, none)) return nambu_pendulum_NOT_FINITE;
             nambu_pendulum_remember(memory, y, iteration);
             return nambu_pendulum_OK;
@@ -1507,6 +1528,8 @@ static int nambu_pendulum_block(nambu_pendulum_solver *s, nambu_pendulum_table *
         if ((++passes >= most || !(size < previous)) && !solved) return 0;
         previous = size;
     }
+    for (int stage = 0; stage < 1; ++stage)
+        if (!nambu_pendulum_near_lanes(model[stage].y, s->x)) return 0;
     for (int i = 0; i < 3; ++i)
         if (!isfinite(x[i])) return 0;
     memcpy(s->x, x, sizeof x);
@@ -1811,19 +1834,26 @@ static void nambu_pendulum_group_advance(nambu_pendulum_lanes x[restrict 3], nam
     }
 }
 
-/* Members that failed, or whose state is not finite, keep the state before the step, and leave. How many stay. */
+/* Members that failed, or whose state is not near the one before the step or not finite, keep that one, and leave. How many
+   stay. */
 static int nambu_pendulum_group_leave(nambu_pendulum_group *group, nambu_pendulum_lanes x[3], nambu_pendulum_lanes carry[3],
     size_t remaining)
 {
-    nambu_pendulum_lanes size = { 0.0 };
+    nambu_pendulum_lanes moved = { 0.0 }, size = { 0.0 }, bad;
     int active = 0;
-    for (int i = 0; i < 3; ++i)
-        for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) size[lane] += fabs(group->x[i][lane]);
+    for (int i = 0; i < 3; ++i) {
+        nambu_pendulum_EACH_LANE
+        for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) {
+            moved[lane] += fabs(group->x[i][lane] - x[i][lane]);
+            size[lane] += fabs(x[i][lane]);
+        }
+    }
+    for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) bad[lane] = moved[lane] <= 4.0 * size[lane] ? 0.0 : 1.0;
     for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) active += group->active[lane];
-    if (active == nambu_pendulum_LANES && nambu_pendulum_largest(size) < HUGE_VAL) return active;
+    if (active == nambu_pendulum_LANES && !(nambu_pendulum_largest(bad) > 0.0)) return active;
     active = 0;
     for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) {
-        group->active[lane] = group->active[lane] && isfinite(size[lane]);
+        group->active[lane] = group->active[lane] && !(bad[lane] > 0.0);
         active += group->active[lane];
         for (int i = 0; i < 3 && !group->active[lane]; ++i) {
             group->x[i][lane] = x[i][lane];

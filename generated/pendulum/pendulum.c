@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: d411923ad09c16af4b5aa70bec17759d8ef97edb169627ac51a029e79421b84c
+ * body-sha256: c7dfecb8c162d8b01b037685a41f14d1e777250032f85c25c5c611c18ee21535
  */
 #include "pendulum.h"
 
@@ -336,6 +336,26 @@ static void pendulum_remember(pendulum_memory *memory, const double value[2], in
     if (memory->slow > memory->patience && memory->count >= 95) pendulum_fit(memory);
 }
 
+/* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved by a point far
+   away, at another energy, that has nothing to do with it. */
+static int pendulum_plausible(const pendulum_solver *s, int stage, const double increment[2])
+{
+    double moved = 0.0, size = 0.0, field[2], end[2];
+    for (int i = 0; i < 2; ++i) {
+        moved += fabs(increment[i]);
+        size += fabs(s->x[i]);
+    }
+    if (moved <= 2.0 * size) return 1;
+    pendulum_vector_field(&s->params, s->x, field);
+    for (int i = 0; i < 2; ++i) {
+        size += fabs(pendulum_fractions[stage] * s->h * field[i]);
+        end[i] = s->x[i] + increment[i];
+    }
+    if (moved <= 2.0 * size) return 1;
+    const double before = pendulum_hamiltonian(&s->params, s->x), after = pendulum_hamiltonian(&s->params, end);
+    return fabs(after - before) <= 0.5 * (fabs(before) + fabs(after));
+}
+
 /* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last
    bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the
    sum is not finite. */
@@ -396,6 +416,7 @@ static pendulum_status pendulum_attempt(pendulum_solver *s, int stage)
             double correction[2] = { 0.0 };
             for (int i = 0; i < 2; ++i)
                 for (int j = 0; j < 2; ++j) correction[i] -= increment_jacobian[i * 2 + j] * delta[j];
+            if (!pendulum_plausible(s, stage, increment)) return pendulum_NO_CONVERGENCE;
             if (!pendulum_advance(s, increment, correction)) return pendulum_NOT_FINITE;
             pendulum_remember(memory, y, iteration + 1);
             return pendulum_OK;
@@ -866,6 +887,8 @@ static int pendulum_block(pendulum_solver *s, pendulum_table *table, int most)
         if ((++passes >= most || !(size < previous)) && !solved) return 0;
         previous = size;
     }
+    for (int stage = 0; stage < 1; ++stage)
+        if (!pendulum_near_lanes(model[stage].y, s->x)) return 0;
     for (int i = 0; i < 2; ++i)
         if (!isfinite(x[i])) return 0;
     memcpy(s->x, x, sizeof x);
@@ -1170,19 +1193,26 @@ static void pendulum_group_advance(pendulum_lanes x[restrict 2], pendulum_lanes 
     }
 }
 
-/* Members that failed, or whose state is not finite, keep the state before the step, and leave. How many stay. */
+/* Members that failed, or whose state is not near the one before the step or not finite, keep that one, and leave. How many
+   stay. */
 static int pendulum_group_leave(pendulum_group *group, pendulum_lanes x[2], pendulum_lanes carry[2],
     size_t remaining)
 {
-    pendulum_lanes size = { 0.0 };
+    pendulum_lanes moved = { 0.0 }, size = { 0.0 }, bad;
     int active = 0;
-    for (int i = 0; i < 2; ++i)
-        for (int lane = 0; lane < pendulum_LANES; ++lane) size[lane] += fabs(group->x[i][lane]);
+    for (int i = 0; i < 2; ++i) {
+        pendulum_EACH_LANE
+        for (int lane = 0; lane < pendulum_LANES; ++lane) {
+            moved[lane] += fabs(group->x[i][lane] - x[i][lane]);
+            size[lane] += fabs(x[i][lane]);
+        }
+    }
+    for (int lane = 0; lane < pendulum_LANES; ++lane) bad[lane] = moved[lane] <= 4.0 * size[lane] ? 0.0 : 1.0;
     for (int lane = 0; lane < pendulum_LANES; ++lane) active += group->active[lane];
-    if (active == pendulum_LANES && pendulum_largest(size) < HUGE_VAL) return active;
+    if (active == pendulum_LANES && !(pendulum_largest(bad) > 0.0)) return active;
     active = 0;
     for (int lane = 0; lane < pendulum_LANES; ++lane) {
-        group->active[lane] = group->active[lane] && isfinite(size[lane]);
+        group->active[lane] = group->active[lane] && !(bad[lane] > 0.0);
         active += group->active[lane];
         for (int i = 0; i < 2 && !group->active[lane]; ++i) {
             group->x[i][lane] = x[i][lane];

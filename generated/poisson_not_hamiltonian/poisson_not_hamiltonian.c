@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: dae80007921e85353c2513595caaa865314e12ce0b6a64f823cfcd701e63c4fb
+ * body-sha256: fab1debfa8c1ba745ee883ea6a9499d73becdf5c2e11930dae142d48c03ac1fd
  */
 #include "poisson_not_hamiltonian.h"
 
@@ -439,6 +439,26 @@ static void poisson_not_hamiltonian_remember(poisson_not_hamiltonian_memory *mem
     if (memory->slow > memory->patience && memory->count >= 95) poisson_not_hamiltonian_fit(memory);
 }
 
+/* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved by a point far
+   away, at another energy, that has nothing to do with it. */
+static int poisson_not_hamiltonian_plausible(const poisson_not_hamiltonian_solver *s, int stage, const double increment[3])
+{
+    double moved = 0.0, size = 0.0, field[3], end[3];
+    for (int i = 0; i < 3; ++i) {
+        moved += fabs(increment[i]);
+        size += fabs(s->x[i]);
+    }
+    if (moved <= 2.0 * size) return 1;
+    poisson_not_hamiltonian_vector_field(&s->params, s->x, field);
+    for (int i = 0; i < 3; ++i) {
+        size += fabs(poisson_not_hamiltonian_fractions[stage] * s->h * field[i]);
+        end[i] = s->x[i] + increment[i];
+    }
+    if (moved <= 2.0 * size) return 1;
+    const double before = poisson_not_hamiltonian_hamiltonian(&s->params, s->x), after = poisson_not_hamiltonian_hamiltonian(&s->params, end);
+    return fabs(after - before) <= 0.5 * (fabs(before) + fabs(after));
+}
+
 /* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last
    bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the
    sum is not finite. */
@@ -499,6 +519,7 @@ static poisson_not_hamiltonian_status poisson_not_hamiltonian_attempt(poisson_no
             double correction[3] = { 0.0 };
             for (int i = 0; i < 3; ++i)
                 for (int j = 0; j < 3; ++j) correction[i] -= increment_jacobian[i * 3 + j] * delta[j];
+            if (!poisson_not_hamiltonian_plausible(s, stage, increment)) return poisson_not_hamiltonian_NO_CONVERGENCE;
             if (!poisson_not_hamiltonian_advance(s, increment, correction)) return poisson_not_hamiltonian_NOT_FINITE;
             poisson_not_hamiltonian_remember(memory, y, iteration + 1);
             return poisson_not_hamiltonian_OK;
@@ -1166,6 +1187,8 @@ static int poisson_not_hamiltonian_block(poisson_not_hamiltonian_solver *s, pois
         if ((++passes >= most || !(size < previous)) && !solved) return 0;
         previous = size;
     }
+    for (int stage = 0; stage < 1; ++stage)
+        if (!poisson_not_hamiltonian_near_lanes(model[stage].y, s->x)) return 0;
     for (int i = 0; i < 3; ++i)
         if (!isfinite(x[i])) return 0;
     memcpy(s->x, x, sizeof x);
@@ -1470,19 +1493,26 @@ static void poisson_not_hamiltonian_group_advance(poisson_not_hamiltonian_lanes 
     }
 }
 
-/* Members that failed, or whose state is not finite, keep the state before the step, and leave. How many stay. */
+/* Members that failed, or whose state is not near the one before the step or not finite, keep that one, and leave. How many
+   stay. */
 static int poisson_not_hamiltonian_group_leave(poisson_not_hamiltonian_group *group, poisson_not_hamiltonian_lanes x[3], poisson_not_hamiltonian_lanes carry[3],
     size_t remaining)
 {
-    poisson_not_hamiltonian_lanes size = { 0.0 };
+    poisson_not_hamiltonian_lanes moved = { 0.0 }, size = { 0.0 }, bad;
     int active = 0;
-    for (int i = 0; i < 3; ++i)
-        for (int lane = 0; lane < poisson_not_hamiltonian_LANES; ++lane) size[lane] += fabs(group->x[i][lane]);
+    for (int i = 0; i < 3; ++i) {
+        poisson_not_hamiltonian_EACH_LANE
+        for (int lane = 0; lane < poisson_not_hamiltonian_LANES; ++lane) {
+            moved[lane] += fabs(group->x[i][lane] - x[i][lane]);
+            size[lane] += fabs(x[i][lane]);
+        }
+    }
+    for (int lane = 0; lane < poisson_not_hamiltonian_LANES; ++lane) bad[lane] = moved[lane] <= 4.0 * size[lane] ? 0.0 : 1.0;
     for (int lane = 0; lane < poisson_not_hamiltonian_LANES; ++lane) active += group->active[lane];
-    if (active == poisson_not_hamiltonian_LANES && poisson_not_hamiltonian_largest(size) < HUGE_VAL) return active;
+    if (active == poisson_not_hamiltonian_LANES && !(poisson_not_hamiltonian_largest(bad) > 0.0)) return active;
     active = 0;
     for (int lane = 0; lane < poisson_not_hamiltonian_LANES; ++lane) {
-        group->active[lane] = group->active[lane] && isfinite(size[lane]);
+        group->active[lane] = group->active[lane] && !(bad[lane] > 0.0);
         active += group->active[lane];
         for (int i = 0; i < 3 && !group->active[lane]; ++i) {
             group->x[i][lane] = x[i][lane];

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 7d2c81d6a7cd9c92f87f9464543fe5b4f02fc0b04022f514e0f77b1a72c0b06b
+ * body-sha256: 9832f3bfc5d561019206ac8e45884a88f8be3ddb7397adc7f3be05db754293c3
  */
 #include "predator_prey.h"
 
@@ -337,6 +337,26 @@ static void predator_prey_remember(predator_prey_memory *memory, const double va
     if (memory->slow > memory->patience && memory->count >= 95) predator_prey_fit(memory);
 }
 
+/* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved by a point far
+   away, at another energy, that has nothing to do with it. */
+static int predator_prey_plausible(const predator_prey_solver *s, int stage, const double increment[2])
+{
+    double moved = 0.0, size = 0.0, field[2], end[2];
+    for (int i = 0; i < 2; ++i) {
+        moved += fabs(increment[i]);
+        size += fabs(s->x[i]);
+    }
+    if (moved <= 2.0 * size) return 1;
+    predator_prey_vector_field(&s->params, s->x, field);
+    for (int i = 0; i < 2; ++i) {
+        size += fabs(predator_prey_fractions[stage] * s->h * field[i]);
+        end[i] = s->x[i] + increment[i];
+    }
+    if (moved <= 2.0 * size) return 1;
+    const double before = predator_prey_hamiltonian(&s->params, s->x), after = predator_prey_hamiltonian(&s->params, end);
+    return fabs(after - before) <= 0.5 * (fabs(before) + fabs(after));
+}
+
 /* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last
    bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the
    sum is not finite. */
@@ -396,6 +416,7 @@ static predator_prey_status predator_prey_attempt(predator_prey_solver *s, int s
             double correction[2] = { 0.0 };
             for (int i = 0; i < 2; ++i)
                 for (int j = 0; j < 2; ++j) correction[i] -= increment_jacobian[i * 2 + j] * delta[j];
+            if (!predator_prey_plausible(s, stage, increment)) return predator_prey_NO_CONVERGENCE;
             if (!predator_prey_advance(s, increment, correction)) return predator_prey_NOT_FINITE;
             predator_prey_remember(memory, y, iteration + 1);
             return predator_prey_OK;
@@ -860,6 +881,8 @@ static int predator_prey_block(predator_prey_solver *s, predator_prey_table *tab
         if ((++passes >= most || !(size < previous)) && !solved) return 0;
         previous = size;
     }
+    for (int stage = 0; stage < 1; ++stage)
+        if (!predator_prey_near_lanes(model[stage].y, s->x)) return 0;
     for (int i = 0; i < 2; ++i)
         if (!isfinite(x[i])) return 0;
     memcpy(s->x, x, sizeof x);
@@ -1164,19 +1187,26 @@ static void predator_prey_group_advance(predator_prey_lanes x[restrict 2], preda
     }
 }
 
-/* Members that failed, or whose state is not finite, keep the state before the step, and leave. How many stay. */
+/* Members that failed, or whose state is not near the one before the step or not finite, keep that one, and leave. How many
+   stay. */
 static int predator_prey_group_leave(predator_prey_group *group, predator_prey_lanes x[2], predator_prey_lanes carry[2],
     size_t remaining)
 {
-    predator_prey_lanes size = { 0.0 };
+    predator_prey_lanes moved = { 0.0 }, size = { 0.0 }, bad;
     int active = 0;
-    for (int i = 0; i < 2; ++i)
-        for (int lane = 0; lane < predator_prey_LANES; ++lane) size[lane] += fabs(group->x[i][lane]);
+    for (int i = 0; i < 2; ++i) {
+        predator_prey_EACH_LANE
+        for (int lane = 0; lane < predator_prey_LANES; ++lane) {
+            moved[lane] += fabs(group->x[i][lane] - x[i][lane]);
+            size[lane] += fabs(x[i][lane]);
+        }
+    }
+    for (int lane = 0; lane < predator_prey_LANES; ++lane) bad[lane] = moved[lane] <= 4.0 * size[lane] ? 0.0 : 1.0;
     for (int lane = 0; lane < predator_prey_LANES; ++lane) active += group->active[lane];
-    if (active == predator_prey_LANES && predator_prey_largest(size) < HUGE_VAL) return active;
+    if (active == predator_prey_LANES && !(predator_prey_largest(bad) > 0.0)) return active;
     active = 0;
     for (int lane = 0; lane < predator_prey_LANES; ++lane) {
-        group->active[lane] = group->active[lane] && isfinite(size[lane]);
+        group->active[lane] = group->active[lane] && !(bad[lane] > 0.0);
         active += group->active[lane];
         for (int i = 0; i < 2 && !group->active[lane]; ++i) {
             group->x[i][lane] = x[i][lane];

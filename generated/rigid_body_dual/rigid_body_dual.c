@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 9ee1c4c34801c673cb5c986e556d7bea1b261261d817788763933d7999441503
+ * body-sha256: ec7229b067aa6c1082ac9f631e2c2ae5bb95b6f1e673b99a503888cf03e93f93
  */
 #include "rigid_body_dual.h"
 
@@ -490,6 +490,26 @@ static void rigid_body_dual_remember(rigid_body_dual_memory *memory, const doubl
     if (memory->slow > memory->patience && memory->count >= 95) rigid_body_dual_fit(memory);
 }
 
+/* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved by a point far
+   away, at another energy, that has nothing to do with it. */
+static int rigid_body_dual_plausible(const rigid_body_dual_solver *s, int stage, const double increment[3])
+{
+    double moved = 0.0, size = 0.0, field[3], end[3];
+    for (int i = 0; i < 3; ++i) {
+        moved += fabs(increment[i]);
+        size += fabs(s->x[i]);
+    }
+    if (moved <= 2.0 * size) return 1;
+    rigid_body_dual_vector_field(&s->params, s->x, field);
+    for (int i = 0; i < 3; ++i) {
+        size += fabs(rigid_body_dual_fractions[stage] * s->h * field[i]);
+        end[i] = s->x[i] + increment[i];
+    }
+    if (moved <= 2.0 * size) return 1;
+    const double before = rigid_body_dual_hamiltonian(&s->params, s->x), after = rigid_body_dual_hamiltonian(&s->params, end);
+    return fabs(after - before) <= 0.5 * (fabs(before) + fabs(after));
+}
+
 /* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last
    bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the
    sum is not finite. */
@@ -550,6 +570,7 @@ static rigid_body_dual_status rigid_body_dual_attempt(rigid_body_dual_solver *s,
             double correction[3] = { 0.0 };
             for (int i = 0; i < 3; ++i)
                 for (int j = 0; j < 3; ++j) correction[i] -= increment_jacobian[i * 3 + j] * delta[j];
+            if (!rigid_body_dual_plausible(s, stage, increment)) return rigid_body_dual_NO_CONVERGENCE;
             if (!rigid_body_dual_advance(s, increment, correction)) return rigid_body_dual_NOT_FINITE;
             rigid_body_dual_remember(memory, y, iteration + 1);
             return rigid_body_dual_OK;
@@ -1298,6 +1319,8 @@ static int rigid_body_dual_block(rigid_body_dual_solver *s, rigid_body_dual_tabl
         if ((++passes >= most || !(size < previous)) && !solved) return 0;
         previous = size;
     }
+    for (int stage = 0; stage < 1; ++stage)
+        if (!rigid_body_dual_near_lanes(model[stage].y, s->x)) return 0;
     for (int i = 0; i < 3; ++i)
         if (!isfinite(x[i])) return 0;
     memcpy(s->x, x, sizeof x);
@@ -1603,19 +1626,26 @@ static void rigid_body_dual_group_advance(rigid_body_dual_lanes x[restrict 3], r
     }
 }
 
-/* Members that failed, or whose state is not finite, keep the state before the step, and leave. How many stay. */
+/* Members that failed, or whose state is not near the one before the step or not finite, keep that one, and leave. How many
+   stay. */
 static int rigid_body_dual_group_leave(rigid_body_dual_group *group, rigid_body_dual_lanes x[3], rigid_body_dual_lanes carry[3],
     size_t remaining)
 {
-    rigid_body_dual_lanes size = { 0.0 };
+    rigid_body_dual_lanes moved = { 0.0 }, size = { 0.0 }, bad;
     int active = 0;
-    for (int i = 0; i < 3; ++i)
-        for (int lane = 0; lane < rigid_body_dual_LANES; ++lane) size[lane] += fabs(group->x[i][lane]);
+    for (int i = 0; i < 3; ++i) {
+        rigid_body_dual_EACH_LANE
+        for (int lane = 0; lane < rigid_body_dual_LANES; ++lane) {
+            moved[lane] += fabs(group->x[i][lane] - x[i][lane]);
+            size[lane] += fabs(x[i][lane]);
+        }
+    }
+    for (int lane = 0; lane < rigid_body_dual_LANES; ++lane) bad[lane] = moved[lane] <= 4.0 * size[lane] ? 0.0 : 1.0;
     for (int lane = 0; lane < rigid_body_dual_LANES; ++lane) active += group->active[lane];
-    if (active == rigid_body_dual_LANES && rigid_body_dual_largest(size) < HUGE_VAL) return active;
+    if (active == rigid_body_dual_LANES && !(rigid_body_dual_largest(bad) > 0.0)) return active;
     active = 0;
     for (int lane = 0; lane < rigid_body_dual_LANES; ++lane) {
-        group->active[lane] = group->active[lane] && isfinite(size[lane]);
+        group->active[lane] = group->active[lane] && !(bad[lane] > 0.0);
         active += group->active[lane];
         for (int i = 0; i < 3 && !group->active[lane]; ++i) {
             group->x[i][lane] = x[i][lane];

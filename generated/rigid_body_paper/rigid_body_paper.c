@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: f0acab5958abaf1de19794a6b8d997a60eb0073a972239a250a79a59317019a3
+ * body-sha256: da60df983c086d25b8b20bbcada31dce255d8a6815c878fd1d7ad507306daa6a
  */
 #include "rigid_body_paper.h"
 
@@ -446,6 +446,26 @@ static void rigid_body_paper_remember(rigid_body_paper_memory *memory, const dou
     if (memory->slow > memory->patience && memory->count >= 95) rigid_body_paper_fit(memory);
 }
 
+/* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved by a point far
+   away, at another energy, that has nothing to do with it. */
+static int rigid_body_paper_plausible(const rigid_body_paper_solver *s, int stage, const double increment[3])
+{
+    double moved = 0.0, size = 0.0, field[3], end[3];
+    for (int i = 0; i < 3; ++i) {
+        moved += fabs(increment[i]);
+        size += fabs(s->x[i]);
+    }
+    if (moved <= 2.0 * size) return 1;
+    rigid_body_paper_vector_field(&s->params, s->x, field);
+    for (int i = 0; i < 3; ++i) {
+        size += fabs(rigid_body_paper_fractions[stage] * s->h * field[i]);
+        end[i] = s->x[i] + increment[i];
+    }
+    if (moved <= 2.0 * size) return 1;
+    const double before = rigid_body_paper_hamiltonian(&s->params, s->x), after = rigid_body_paper_hamiltonian(&s->params, end);
+    return fabs(after - before) <= 0.5 * (fabs(before) + fabs(after));
+}
+
 /* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last
    bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the
    sum is not finite. */
@@ -506,6 +526,7 @@ static rigid_body_paper_status rigid_body_paper_attempt(rigid_body_paper_solver 
             double correction[3] = { 0.0 };
             for (int i = 0; i < 3; ++i)
                 for (int j = 0; j < 3; ++j) correction[i] -= increment_jacobian[i * 3 + j] * delta[j];
+            if (!rigid_body_paper_plausible(s, stage, increment)) return rigid_body_paper_NO_CONVERGENCE;
             if (!rigid_body_paper_advance(s, increment, correction)) return rigid_body_paper_NOT_FINITE;
             rigid_body_paper_remember(memory, y, iteration + 1);
             return rigid_body_paper_OK;
@@ -1040,6 +1061,8 @@ static int rigid_body_paper_block(rigid_body_paper_solver *s, rigid_body_paper_t
         if ((++passes >= most || !(size < previous)) && !solved) return 0;
         previous = size;
     }
+    for (int stage = 0; stage < 1; ++stage)
+        if (!rigid_body_paper_near_lanes(model[stage].y, s->x)) return 0;
     for (int i = 0; i < 3; ++i)
         if (!isfinite(x[i])) return 0;
     memcpy(s->x, x, sizeof x);
@@ -1344,19 +1367,26 @@ static void rigid_body_paper_group_advance(rigid_body_paper_lanes x[restrict 3],
     }
 }
 
-/* Members that failed, or whose state is not finite, keep the state before the step, and leave. How many stay. */
+/* Members that failed, or whose state is not near the one before the step or not finite, keep that one, and leave. How many
+   stay. */
 static int rigid_body_paper_group_leave(rigid_body_paper_group *group, rigid_body_paper_lanes x[3], rigid_body_paper_lanes carry[3],
     size_t remaining)
 {
-    rigid_body_paper_lanes size = { 0.0 };
+    rigid_body_paper_lanes moved = { 0.0 }, size = { 0.0 }, bad;
     int active = 0;
-    for (int i = 0; i < 3; ++i)
-        for (int lane = 0; lane < rigid_body_paper_LANES; ++lane) size[lane] += fabs(group->x[i][lane]);
+    for (int i = 0; i < 3; ++i) {
+        rigid_body_paper_EACH_LANE
+        for (int lane = 0; lane < rigid_body_paper_LANES; ++lane) {
+            moved[lane] += fabs(group->x[i][lane] - x[i][lane]);
+            size[lane] += fabs(x[i][lane]);
+        }
+    }
+    for (int lane = 0; lane < rigid_body_paper_LANES; ++lane) bad[lane] = moved[lane] <= 4.0 * size[lane] ? 0.0 : 1.0;
     for (int lane = 0; lane < rigid_body_paper_LANES; ++lane) active += group->active[lane];
-    if (active == rigid_body_paper_LANES && rigid_body_paper_largest(size) < HUGE_VAL) return active;
+    if (active == rigid_body_paper_LANES && !(rigid_body_paper_largest(bad) > 0.0)) return active;
     active = 0;
     for (int lane = 0; lane < rigid_body_paper_LANES; ++lane) {
-        group->active[lane] = group->active[lane] && isfinite(size[lane]);
+        group->active[lane] = group->active[lane] && !(bad[lane] > 0.0);
         active += group->active[lane];
         for (int i = 0; i < 3 && !group->active[lane]; ++i) {
             group->x[i][lane] = x[i][lane];

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: dacb3965efdea6ce7541517ed1f43c7cc2863725e6a974481a45a753f55aab5c
+ * body-sha256: 0819c3bbf2a4b541b6e05862ac2f392ffd1e318fede939e0dc6115d7652b6501
  */
 #include "sir_epidemic.h"
 
@@ -306,6 +306,26 @@ static void sir_epidemic_remember(sir_epidemic_memory *memory, const double valu
     if (memory->slow > memory->patience && memory->count >= 95) sir_epidemic_fit(memory);
 }
 
+/* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved by a point far
+   away, at another energy, that has nothing to do with it. */
+static int sir_epidemic_plausible(const sir_epidemic_solver *s, int stage, const double increment[3])
+{
+    double moved = 0.0, size = 0.0, field[3], end[3];
+    for (int i = 0; i < 3; ++i) {
+        moved += fabs(increment[i]);
+        size += fabs(s->x[i]);
+    }
+    if (moved <= 2.0 * size) return 1;
+    sir_epidemic_vector_field(&s->params, s->x, field);
+    for (int i = 0; i < 3; ++i) {
+        size += fabs(sir_epidemic_fractions[stage] * s->h * field[i]);
+        end[i] = s->x[i] + increment[i];
+    }
+    if (moved <= 2.0 * size) return 1;
+    const double before = sir_epidemic_hamiltonian(&s->params, s->x), after = sir_epidemic_hamiltonian(&s->params, end);
+    return fabs(after - before) <= 0.5 * (fabs(before) + fabs(after));
+}
+
 /* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last
    bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the
    sum is not finite. */
@@ -477,6 +497,7 @@ static sir_epidemic_status sir_epidemic_attempt(sir_epidemic_solver *s, int stag
         size /= norm;
         /* The second test: residuals no longer shrink, the solve has reached the level of rounding. */
         if (size <= 4e-16 || (previous < 1e-12 && size > 0.25 * previous)) {
+            if (!sir_epidemic_plausible(s, stage, change)) return sir_epidemic_NO_CONVERGENCE;
             if (!sir_epidemic_advance(s, change, none)) return sir_epidemic_NOT_FINITE;
             sir_epidemic_remember(memory, y, iteration);
             return sir_epidemic_OK;
@@ -1487,6 +1508,8 @@ static int sir_epidemic_block(sir_epidemic_solver *s, sir_epidemic_table *table,
         if ((++passes >= most || !(size < previous)) && !solved) return 0;
         previous = size;
     }
+    for (int stage = 0; stage < 1; ++stage)
+        if (!sir_epidemic_near_lanes(model[stage].y, s->x)) return 0;
     for (int i = 0; i < 3; ++i)
         if (!isfinite(x[i])) return 0;
     memcpy(s->x, x, sizeof x);
@@ -1791,19 +1814,26 @@ static void sir_epidemic_group_advance(sir_epidemic_lanes x[restrict 3], sir_epi
     }
 }
 
-/* Members that failed, or whose state is not finite, keep the state before the step, and leave. How many stay. */
+/* Members that failed, or whose state is not near the one before the step or not finite, keep that one, and leave. How many
+   stay. */
 static int sir_epidemic_group_leave(sir_epidemic_group *group, sir_epidemic_lanes x[3], sir_epidemic_lanes carry[3],
     size_t remaining)
 {
-    sir_epidemic_lanes size = { 0.0 };
+    sir_epidemic_lanes moved = { 0.0 }, size = { 0.0 }, bad;
     int active = 0;
-    for (int i = 0; i < 3; ++i)
-        for (int lane = 0; lane < sir_epidemic_LANES; ++lane) size[lane] += fabs(group->x[i][lane]);
+    for (int i = 0; i < 3; ++i) {
+        sir_epidemic_EACH_LANE
+        for (int lane = 0; lane < sir_epidemic_LANES; ++lane) {
+            moved[lane] += fabs(group->x[i][lane] - x[i][lane]);
+            size[lane] += fabs(x[i][lane]);
+        }
+    }
+    for (int lane = 0; lane < sir_epidemic_LANES; ++lane) bad[lane] = moved[lane] <= 4.0 * size[lane] ? 0.0 : 1.0;
     for (int lane = 0; lane < sir_epidemic_LANES; ++lane) active += group->active[lane];
-    if (active == sir_epidemic_LANES && sir_epidemic_largest(size) < HUGE_VAL) return active;
+    if (active == sir_epidemic_LANES && !(sir_epidemic_largest(bad) > 0.0)) return active;
     active = 0;
     for (int lane = 0; lane < sir_epidemic_LANES; ++lane) {
-        group->active[lane] = group->active[lane] && isfinite(size[lane]);
+        group->active[lane] = group->active[lane] && !(bad[lane] > 0.0);
         active += group->active[lane];
         for (int i = 0; i < 3 && !group->active[lane]; ++i) {
             group->x[i][lane] = x[i][lane];

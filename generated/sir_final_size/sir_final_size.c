@@ -12,7 +12,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 46d285d7f7f451a26f084369607f29907088b49e291002dfd8737903dc9caa69
+ * body-sha256: 94b39dba1197c28e0c778c1de70d76794c045776e759b8dafc0eb318c8f6a29b
  */
 #include "sir_final_size.h"
 
@@ -298,6 +298,26 @@ static void sir_final_size_remember(sir_final_size_memory *memory, const double 
     if (memory->slow > memory->patience && memory->count >= 95) sir_final_size_fit(memory);
 }
 
+/* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved by a point far
+   away, at another energy, that has nothing to do with it. */
+static int sir_final_size_plausible(const sir_final_size_solver *s, int stage, const double increment[3])
+{
+    double moved = 0.0, size = 0.0, field[3], end[3];
+    for (int i = 0; i < 3; ++i) {
+        moved += fabs(increment[i]);
+        size += fabs(s->x[i]);
+    }
+    if (moved <= 2.0 * size) return 1;
+    sir_final_size_vector_field(&s->params, s->x, field);
+    for (int i = 0; i < 3; ++i) {
+        size += fabs(sir_final_size_fractions[stage] * s->h * field[i]);
+        end[i] = s->x[i] + increment[i];
+    }
+    if (moved <= 2.0 * size) return 1;
+    const double before = sir_final_size_hamiltonian(&s->params, s->x), after = sir_final_size_hamiltonian(&s->params, end);
+    return fabs(after - before) <= 0.5 * (fabs(before) + fabs(after));
+}
+
 /* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last
    bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the
    sum is not finite. */
@@ -479,6 +499,7 @@ static sir_final_size_status sir_final_size_attempt(sir_final_size_solver *s, in
         size /= norm;
         /* The second test: residuals no longer shrink, the solve has reached the level of rounding. */
         if (size <= 4e-16 || (previous < 1e-12 && size > 0.25 * previous)) {
+            if (!sir_final_size_plausible(s, stage, change)) return sir_final_size_NO_CONVERGENCE;
             if (!sir_final_size_advance(s, change, none)) return sir_final_size_NOT_FINITE;
             sir_final_size_remember(memory, y, iteration);
             return sir_final_size_OK;
@@ -1502,6 +1523,8 @@ static int sir_final_size_block(sir_final_size_solver *s, sir_final_size_table *
         if ((++passes >= most || !(size < previous)) && !solved) return 0;
         previous = size;
     }
+    for (int stage = 0; stage < 1; ++stage)
+        if (!sir_final_size_near_lanes(model[stage].y, s->x)) return 0;
     for (int i = 0; i < 3; ++i)
         if (!isfinite(x[i])) return 0;
     memcpy(s->x, x, sizeof x);
@@ -1806,19 +1829,26 @@ static void sir_final_size_group_advance(sir_final_size_lanes x[restrict 3], sir
     }
 }
 
-/* Members that failed, or whose state is not finite, keep the state before the step, and leave. How many stay. */
+/* Members that failed, or whose state is not near the one before the step or not finite, keep that one, and leave. How many
+   stay. */
 static int sir_final_size_group_leave(sir_final_size_group *group, sir_final_size_lanes x[3], sir_final_size_lanes carry[3],
     size_t remaining)
 {
-    sir_final_size_lanes size = { 0.0 };
+    sir_final_size_lanes moved = { 0.0 }, size = { 0.0 }, bad;
     int active = 0;
-    for (int i = 0; i < 3; ++i)
-        for (int lane = 0; lane < sir_final_size_LANES; ++lane) size[lane] += fabs(group->x[i][lane]);
+    for (int i = 0; i < 3; ++i) {
+        sir_final_size_EACH_LANE
+        for (int lane = 0; lane < sir_final_size_LANES; ++lane) {
+            moved[lane] += fabs(group->x[i][lane] - x[i][lane]);
+            size[lane] += fabs(x[i][lane]);
+        }
+    }
+    for (int lane = 0; lane < sir_final_size_LANES; ++lane) bad[lane] = moved[lane] <= 4.0 * size[lane] ? 0.0 : 1.0;
     for (int lane = 0; lane < sir_final_size_LANES; ++lane) active += group->active[lane];
-    if (active == sir_final_size_LANES && sir_final_size_largest(size) < HUGE_VAL) return active;
+    if (active == sir_final_size_LANES && !(sir_final_size_largest(bad) > 0.0)) return active;
     active = 0;
     for (int lane = 0; lane < sir_final_size_LANES; ++lane) {
-        group->active[lane] = group->active[lane] && isfinite(size[lane]);
+        group->active[lane] = group->active[lane] && !(bad[lane] > 0.0);
         active += group->active[lane];
         for (int i = 0; i < 3 && !group->active[lane]; ++i) {
             group->x[i][lane] = x[i][lane];

@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: eaba2cc7873b034c1e8d0d50ba0adcb36ff0f2bef0e47356eab3a02e75ab212f
+ * body-sha256: 53f715d79b06002aedaf042c294a9bb32e237ce42cb717d2bbc698dca0b7d5da
  */
 #include "sklyanin_gyrostat.h"
 
@@ -402,6 +402,26 @@ static void sklyanin_gyrostat_remember(sklyanin_gyrostat_memory *memory, const d
     if (memory->slow > memory->patience && memory->count >= 95) sklyanin_gyrostat_fit(memory);
 }
 
+/* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved by a point far
+   away, at another energy, that has nothing to do with it. */
+static int sklyanin_gyrostat_plausible(const sklyanin_gyrostat_solver *s, int stage, const double increment[4])
+{
+    double moved = 0.0, size = 0.0, field[4], end[4];
+    for (int i = 0; i < 4; ++i) {
+        moved += fabs(increment[i]);
+        size += fabs(s->x[i]);
+    }
+    if (moved <= 2.0 * size) return 1;
+    sklyanin_gyrostat_vector_field(&s->params, s->x, field);
+    for (int i = 0; i < 4; ++i) {
+        size += fabs(sklyanin_gyrostat_fractions[stage] * s->h * field[i]);
+        end[i] = s->x[i] + increment[i];
+    }
+    if (moved <= 2.0 * size) return 1;
+    const double before = sklyanin_gyrostat_hamiltonian(&s->params, s->x), after = sklyanin_gyrostat_hamiltonian(&s->params, end);
+    return fabs(after - before) <= 0.5 * (fabs(before) + fabs(after));
+}
+
 /* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last
    bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the
    sum is not finite. */
@@ -662,6 +682,7 @@ static sklyanin_gyrostat_status sklyanin_gyrostat_attempt(sklyanin_gyrostat_solv
         size /= norm;
         /* The second test: residuals no longer shrink, the solve has reached the level of rounding. */
         if (size <= 4e-16 || (previous < 1e-12 && size > 0.25 * previous)) {
+            if (!sklyanin_gyrostat_plausible(s, stage, change)) return sklyanin_gyrostat_NO_CONVERGENCE;
             if (!sklyanin_gyrostat_advance(s, change, none)) return sklyanin_gyrostat_NOT_FINITE;
             sklyanin_gyrostat_remember(memory, y, iteration);
             return sklyanin_gyrostat_OK;
@@ -2244,6 +2265,8 @@ static int sklyanin_gyrostat_block(sklyanin_gyrostat_solver *s, sklyanin_gyrosta
         if ((++passes >= most || !(size < previous)) && !solved) return 0;
         previous = size;
     }
+    for (int stage = 0; stage < 1; ++stage)
+        if (!sklyanin_gyrostat_near_lanes(model[stage].y, s->x)) return 0;
     for (int i = 0; i < 4; ++i)
         if (!isfinite(x[i])) return 0;
     memcpy(s->x, x, sizeof x);
@@ -2549,19 +2572,26 @@ static void sklyanin_gyrostat_group_advance(sklyanin_gyrostat_lanes x[restrict 4
     }
 }
 
-/* Members that failed, or whose state is not finite, keep the state before the step, and leave. How many stay. */
+/* Members that failed, or whose state is not near the one before the step or not finite, keep that one, and leave. How many
+   stay. */
 static int sklyanin_gyrostat_group_leave(sklyanin_gyrostat_group *group, sklyanin_gyrostat_lanes x[4], sklyanin_gyrostat_lanes carry[4],
     size_t remaining)
 {
-    sklyanin_gyrostat_lanes size = { 0.0 };
+    sklyanin_gyrostat_lanes moved = { 0.0 }, size = { 0.0 }, bad;
     int active = 0;
-    for (int i = 0; i < 4; ++i)
-        for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) size[lane] += fabs(group->x[i][lane]);
+    for (int i = 0; i < 4; ++i) {
+        sklyanin_gyrostat_EACH_LANE
+        for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) {
+            moved[lane] += fabs(group->x[i][lane] - x[i][lane]);
+            size[lane] += fabs(x[i][lane]);
+        }
+    }
+    for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) bad[lane] = moved[lane] <= 4.0 * size[lane] ? 0.0 : 1.0;
     for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) active += group->active[lane];
-    if (active == sklyanin_gyrostat_LANES && sklyanin_gyrostat_largest(size) < HUGE_VAL) return active;
+    if (active == sklyanin_gyrostat_LANES && !(sklyanin_gyrostat_largest(bad) > 0.0)) return active;
     active = 0;
     for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) {
-        group->active[lane] = group->active[lane] && isfinite(size[lane]);
+        group->active[lane] = group->active[lane] && !(bad[lane] > 0.0);
         active += group->active[lane];
         for (int i = 0; i < 4 && !group->active[lane]; ++i) {
             group->x[i][lane] = x[i][lane];

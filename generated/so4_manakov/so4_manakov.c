@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: e76d9d4d6c1b260412e03f32c8134a27f954751dbad9c487eae5003c876ad80a
+ * body-sha256: 02bea8decadb950c7e1b7849e67656fe529b2ecdd44221e7d0e64bdf8f96fd21
  */
 #include "so4_manakov.h"
 
@@ -911,6 +911,26 @@ static void so4_manakov_remember(so4_manakov_memory *memory, const double value[
     if (memory->slow > memory->patience && memory->count >= 95) so4_manakov_fit(memory);
 }
 
+/* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved by a point far
+   away, at another energy, that has nothing to do with it. */
+static int so4_manakov_plausible(const so4_manakov_solver *s, int stage, const double increment[6])
+{
+    double moved = 0.0, size = 0.0, field[6], end[6];
+    for (int i = 0; i < 6; ++i) {
+        moved += fabs(increment[i]);
+        size += fabs(s->x[i]);
+    }
+    if (moved <= 2.0 * size) return 1;
+    so4_manakov_vector_field(&s->params, s->x, field);
+    for (int i = 0; i < 6; ++i) {
+        size += fabs(so4_manakov_fractions[stage] * s->h * field[i]);
+        end[i] = s->x[i] + increment[i];
+    }
+    if (moved <= 2.0 * size) return 1;
+    const double before = so4_manakov_hamiltonian(&s->params, s->x), after = so4_manakov_hamiltonian(&s->params, end);
+    return fabs(after - before) <= 0.5 * (fabs(before) + fabs(after));
+}
+
 /* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last
    bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the
    sum is not finite. */
@@ -971,6 +991,7 @@ static so4_manakov_status so4_manakov_attempt(so4_manakov_solver *s, int stage)
             double correction[6] = { 0.0 };
             for (int i = 0; i < 6; ++i)
                 for (int j = 0; j < 6; ++j) correction[i] -= increment_jacobian[i * 6 + j] * delta[j];
+            if (!so4_manakov_plausible(s, stage, increment)) return so4_manakov_NO_CONVERGENCE;
             if (!so4_manakov_advance(s, increment, correction)) return so4_manakov_NOT_FINITE;
             so4_manakov_remember(memory, y, iteration + 1);
             return so4_manakov_OK;
@@ -2203,6 +2224,8 @@ static int so4_manakov_block(so4_manakov_solver *s, so4_manakov_table *table, in
         if ((++passes >= most || !(size < previous)) && !solved) return 0;
         previous = size;
     }
+    for (int stage = 0; stage < 1; ++stage)
+        if (!so4_manakov_near_lanes(model[stage].y, s->x)) return 0;
     for (int i = 0; i < 6; ++i)
         if (!isfinite(x[i])) return 0;
     memcpy(s->x, x, sizeof x);
@@ -2508,19 +2531,26 @@ static void so4_manakov_group_advance(so4_manakov_lanes x[restrict 6], so4_manak
     }
 }
 
-/* Members that failed, or whose state is not finite, keep the state before the step, and leave. How many stay. */
+/* Members that failed, or whose state is not near the one before the step or not finite, keep that one, and leave. How many
+   stay. */
 static int so4_manakov_group_leave(so4_manakov_group *group, so4_manakov_lanes x[6], so4_manakov_lanes carry[6],
     size_t remaining)
 {
-    so4_manakov_lanes size = { 0.0 };
+    so4_manakov_lanes moved = { 0.0 }, size = { 0.0 }, bad;
     int active = 0;
-    for (int i = 0; i < 6; ++i)
-        for (int lane = 0; lane < so4_manakov_LANES; ++lane) size[lane] += fabs(group->x[i][lane]);
+    for (int i = 0; i < 6; ++i) {
+        so4_manakov_EACH_LANE
+        for (int lane = 0; lane < so4_manakov_LANES; ++lane) {
+            moved[lane] += fabs(group->x[i][lane] - x[i][lane]);
+            size[lane] += fabs(x[i][lane]);
+        }
+    }
+    for (int lane = 0; lane < so4_manakov_LANES; ++lane) bad[lane] = moved[lane] <= 4.0 * size[lane] ? 0.0 : 1.0;
     for (int lane = 0; lane < so4_manakov_LANES; ++lane) active += group->active[lane];
-    if (active == so4_manakov_LANES && so4_manakov_largest(size) < HUGE_VAL) return active;
+    if (active == so4_manakov_LANES && !(so4_manakov_largest(bad) > 0.0)) return active;
     active = 0;
     for (int lane = 0; lane < so4_manakov_LANES; ++lane) {
-        group->active[lane] = group->active[lane] && isfinite(size[lane]);
+        group->active[lane] = group->active[lane] && !(bad[lane] > 0.0);
         active += group->active[lane];
         for (int i = 0; i < 6 && !group->active[lane]; ++i) {
             group->x[i][lane] = x[i][lane];

@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: c35268c0f9b94507f08a5452c5a6612f72a9e5acc7c6760fc971c2c8626572ba
+ * body-sha256: bcbab431c7adda4c809cbef910bfe2701b68b67d4298a00ccbe7365e1af4fea1
  */
 #include "spin_chain5.h"
 
@@ -1889,6 +1889,26 @@ static void spin_chain5_remember(spin_chain5_memory *memory, const double value[
     if (memory->slow > memory->patience && memory->count >= 95) spin_chain5_fit(memory);
 }
 
+/* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved by a point far
+   away, at another energy, that has nothing to do with it. */
+static int spin_chain5_plausible(const spin_chain5_solver *s, int stage, const double increment[15])
+{
+    double moved = 0.0, size = 0.0, field[15], end[15];
+    for (int i = 0; i < 15; ++i) {
+        moved += fabs(increment[i]);
+        size += fabs(s->x[i]);
+    }
+    if (moved <= 2.0 * size) return 1;
+    spin_chain5_vector_field(&s->params, s->x, field);
+    for (int i = 0; i < 15; ++i) {
+        size += fabs(spin_chain5_fractions[stage] * s->h * field[i]);
+        end[i] = s->x[i] + increment[i];
+    }
+    if (moved <= 2.0 * size) return 1;
+    const double before = spin_chain5_hamiltonian(&s->params, s->x), after = spin_chain5_hamiltonian(&s->params, end);
+    return fabs(after - before) <= 0.5 * (fabs(before) + fabs(after));
+}
+
 /* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last
    bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the
    sum is not finite. */
@@ -1949,6 +1969,7 @@ static spin_chain5_status spin_chain5_attempt(spin_chain5_solver *s, int stage)
             double correction[15] = { 0.0 };
             for (int i = 0; i < 15; ++i)
                 for (int j = 0; j < 15; ++j) correction[i] -= increment_jacobian[i * 15 + j] * delta[j];
+            if (!spin_chain5_plausible(s, stage, increment)) return spin_chain5_NO_CONVERGENCE;
             if (!spin_chain5_advance(s, increment, correction)) return spin_chain5_NOT_FINITE;
             spin_chain5_remember(memory, y, iteration + 1);
             return spin_chain5_OK;
@@ -4823,6 +4844,8 @@ static int spin_chain5_block(spin_chain5_solver *s, spin_chain5_table *table, in
         if ((++passes >= most || !(size < previous)) && !solved) return 0;
         previous = size;
     }
+    for (int stage = 0; stage < 1; ++stage)
+        if (!spin_chain5_near_lanes(model[stage].y, s->x)) return 0;
     for (int i = 0; i < 15; ++i)
         if (!isfinite(x[i])) return 0;
     memcpy(s->x, x, sizeof x);
@@ -5128,19 +5151,26 @@ static void spin_chain5_group_advance(spin_chain5_lanes x[restrict 15], spin_cha
     }
 }
 
-/* Members that failed, or whose state is not finite, keep the state before the step, and leave. How many stay. */
+/* Members that failed, or whose state is not near the one before the step or not finite, keep that one, and leave. How many
+   stay. */
 static int spin_chain5_group_leave(spin_chain5_group *group, spin_chain5_lanes x[15], spin_chain5_lanes carry[15],
     size_t remaining)
 {
-    spin_chain5_lanes size = { 0.0 };
+    spin_chain5_lanes moved = { 0.0 }, size = { 0.0 }, bad;
     int active = 0;
-    for (int i = 0; i < 15; ++i)
-        for (int lane = 0; lane < spin_chain5_LANES; ++lane) size[lane] += fabs(group->x[i][lane]);
+    for (int i = 0; i < 15; ++i) {
+        spin_chain5_EACH_LANE
+        for (int lane = 0; lane < spin_chain5_LANES; ++lane) {
+            moved[lane] += fabs(group->x[i][lane] - x[i][lane]);
+            size[lane] += fabs(x[i][lane]);
+        }
+    }
+    for (int lane = 0; lane < spin_chain5_LANES; ++lane) bad[lane] = moved[lane] <= 4.0 * size[lane] ? 0.0 : 1.0;
     for (int lane = 0; lane < spin_chain5_LANES; ++lane) active += group->active[lane];
-    if (active == spin_chain5_LANES && spin_chain5_largest(size) < HUGE_VAL) return active;
+    if (active == spin_chain5_LANES && !(spin_chain5_largest(bad) > 0.0)) return active;
     active = 0;
     for (int lane = 0; lane < spin_chain5_LANES; ++lane) {
-        group->active[lane] = group->active[lane] && isfinite(size[lane]);
+        group->active[lane] = group->active[lane] && !(bad[lane] > 0.0);
         active += group->active[lane];
         for (int i = 0; i < 15 && !group->active[lane]; ++i) {
             group->x[i][lane] = x[i][lane];

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 2525c8894a9af2217b3cd4525cc09d0c5e4affa1f9796537f2b36bc7e41e1c28
+ * body-sha256: 487854f07173b9ce1ea2db23d79b9759156e1a2c6be2981cf76a1110c13bdd4c
  */
 #include "toda3.h"
 
@@ -521,6 +521,26 @@ static void toda3_remember(toda3_memory *memory, const double value[5], int iter
     if (memory->slow > memory->patience && memory->count >= 95) toda3_fit(memory);
 }
 
+/* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved by a point far
+   away, at another energy, that has nothing to do with it. */
+static int toda3_plausible(const toda3_solver *s, int stage, const double increment[5])
+{
+    double moved = 0.0, size = 0.0, field[5], end[5];
+    for (int i = 0; i < 5; ++i) {
+        moved += fabs(increment[i]);
+        size += fabs(s->x[i]);
+    }
+    if (moved <= 2.0 * size) return 1;
+    toda3_vector_field(&s->params, s->x, field);
+    for (int i = 0; i < 5; ++i) {
+        size += fabs(toda3_fractions[stage] * s->h * field[i]);
+        end[i] = s->x[i] + increment[i];
+    }
+    if (moved <= 2.0 * size) return 1;
+    const double before = toda3_hamiltonian(&s->params, s->x), after = toda3_hamiltonian(&s->params, end);
+    return fabs(after - before) <= 0.5 * (fabs(before) + fabs(after));
+}
+
 /* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last
    bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the
    sum is not finite. */
@@ -581,6 +601,7 @@ static toda3_status toda3_attempt(toda3_solver *s, int stage)
             double correction[5] = { 0.0 };
             for (int i = 0; i < 5; ++i)
                 for (int j = 0; j < 5; ++j) correction[i] -= increment_jacobian[i * 5 + j] * delta[j];
+            if (!toda3_plausible(s, stage, increment)) return toda3_NO_CONVERGENCE;
             if (!toda3_advance(s, increment, correction)) return toda3_NOT_FINITE;
             toda3_remember(memory, y, iteration + 1);
             return toda3_OK;
@@ -1219,6 +1240,8 @@ static int toda3_block(toda3_solver *s, toda3_table *table, int most)
         if ((++passes >= most || !(size < previous)) && !solved) return 0;
         previous = size;
     }
+    for (int stage = 0; stage < 1; ++stage)
+        if (!toda3_near_lanes(model[stage].y, s->x)) return 0;
     for (int i = 0; i < 5; ++i)
         if (!isfinite(x[i])) return 0;
     memcpy(s->x, x, sizeof x);
@@ -1523,19 +1546,26 @@ static void toda3_group_advance(toda3_lanes x[restrict 5], toda3_lanes carry[res
     }
 }
 
-/* Members that failed, or whose state is not finite, keep the state before the step, and leave. How many stay. */
+/* Members that failed, or whose state is not near the one before the step or not finite, keep that one, and leave. How many
+   stay. */
 static int toda3_group_leave(toda3_group *group, toda3_lanes x[5], toda3_lanes carry[5],
     size_t remaining)
 {
-    toda3_lanes size = { 0.0 };
+    toda3_lanes moved = { 0.0 }, size = { 0.0 }, bad;
     int active = 0;
-    for (int i = 0; i < 5; ++i)
-        for (int lane = 0; lane < toda3_LANES; ++lane) size[lane] += fabs(group->x[i][lane]);
+    for (int i = 0; i < 5; ++i) {
+        toda3_EACH_LANE
+        for (int lane = 0; lane < toda3_LANES; ++lane) {
+            moved[lane] += fabs(group->x[i][lane] - x[i][lane]);
+            size[lane] += fabs(x[i][lane]);
+        }
+    }
+    for (int lane = 0; lane < toda3_LANES; ++lane) bad[lane] = moved[lane] <= 4.0 * size[lane] ? 0.0 : 1.0;
     for (int lane = 0; lane < toda3_LANES; ++lane) active += group->active[lane];
-    if (active == toda3_LANES && toda3_largest(size) < HUGE_VAL) return active;
+    if (active == toda3_LANES && !(toda3_largest(bad) > 0.0)) return active;
     active = 0;
     for (int lane = 0; lane < toda3_LANES; ++lane) {
-        group->active[lane] = group->active[lane] && isfinite(size[lane]);
+        group->active[lane] = group->active[lane] && !(bad[lane] > 0.0);
         active += group->active[lane];
         for (int i = 0; i < 5 && !group->active[lane]; ++i) {
             group->x[i][lane] = x[i][lane];

@@ -12,7 +12,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: b474bf1b68766c33a3abb0365cbd662013505db0b5ab5f2ec7ddb3d2b2aced20
+ * body-sha256: 921d716e48a6632e4e9c9e91d3023c5320e62187474d82f086832e993182fcda
  */
 #include "toda3_quadratic.h"
 
@@ -280,6 +280,26 @@ static void toda3_quadratic_remember(toda3_quadratic_memory *memory, const doubl
     if (memory->slow > memory->patience && memory->count >= 96) toda3_quadratic_fit(memory);
 }
 
+/* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved by a point far
+   away, at another energy, that has nothing to do with it. */
+static int toda3_quadratic_plausible(const toda3_quadratic_solver *s, int stage, const double increment[5])
+{
+    double moved = 0.0, size = 0.0, field[5], end[5];
+    for (int i = 0; i < 5; ++i) {
+        moved += fabs(increment[i]);
+        size += fabs(s->x[i]);
+    }
+    if (moved <= 2.0 * size) return 1;
+    toda3_quadratic_vector_field(&s->params, s->x, field);
+    for (int i = 0; i < 5; ++i) {
+        size += fabs(toda3_quadratic_fractions[stage] * s->h * field[i]);
+        end[i] = s->x[i] + increment[i];
+    }
+    if (moved <= 2.0 * size) return 1;
+    const double before = toda3_quadratic_hamiltonian(&s->params, s->x), after = toda3_quadratic_hamiltonian(&s->params, end);
+    return fabs(after - before) <= 0.5 * (fabs(before) + fabs(after));
+}
+
 /* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last
    bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the
    sum is not finite. */
@@ -542,6 +562,7 @@ static toda3_quadratic_status toda3_quadratic_attempt(toda3_quadratic_solver *s,
         size /= norm;
         /* The second test: residuals no longer shrink, the solve has reached the level of rounding. */
         if (size <= 4e-16 || (previous < 1e-12 && size > 0.25 * previous)) {
+            if (!toda3_quadratic_plausible(s, stage, change)) return toda3_quadratic_NO_CONVERGENCE;
             if (!toda3_quadratic_advance(s, change, none)) return toda3_quadratic_NOT_FINITE;
             toda3_quadratic_remember(memory, y, iteration);
             return toda3_quadratic_OK;

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: b0df10620f4a4760fde8e33ce6768ebc60dbe26a1aabe9a5d726cd484457f659
+ * body-sha256: e9dc475a4fa978fe1d699b154ca9732a6ae6425d5577e30576f6d6f67f623654
  */
 #include "volterra5.h"
 
@@ -432,6 +432,26 @@ static void volterra5_remember(volterra5_memory *memory, const double value[5], 
     if (memory->slow > memory->patience && memory->count >= 95) volterra5_fit(memory);
 }
 
+/* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved by a point far
+   away, at another energy, that has nothing to do with it. */
+static int volterra5_plausible(const volterra5_solver *s, int stage, const double increment[5])
+{
+    double moved = 0.0, size = 0.0, field[5], end[5];
+    for (int i = 0; i < 5; ++i) {
+        moved += fabs(increment[i]);
+        size += fabs(s->x[i]);
+    }
+    if (moved <= 2.0 * size) return 1;
+    volterra5_vector_field(&s->params, s->x, field);
+    for (int i = 0; i < 5; ++i) {
+        size += fabs(volterra5_fractions[stage] * s->h * field[i]);
+        end[i] = s->x[i] + increment[i];
+    }
+    if (moved <= 2.0 * size) return 1;
+    const double before = volterra5_hamiltonian(&s->params, s->x), after = volterra5_hamiltonian(&s->params, end);
+    return fabs(after - before) <= 0.5 * (fabs(before) + fabs(after));
+}
+
 /* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last
    bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the
    sum is not finite. */
@@ -491,6 +511,7 @@ static volterra5_status volterra5_attempt(volterra5_solver *s, int stage)
             double correction[5] = { 0.0 };
             for (int i = 0; i < 5; ++i)
                 for (int j = 0; j < 5; ++j) correction[i] -= increment_jacobian[i * 5 + j] * delta[j];
+            if (!volterra5_plausible(s, stage, increment)) return volterra5_NO_CONVERGENCE;
             if (!volterra5_advance(s, increment, correction)) return volterra5_NOT_FINITE;
             volterra5_remember(memory, y, iteration + 1);
             return volterra5_OK;
@@ -1126,6 +1147,8 @@ static int volterra5_block(volterra5_solver *s, volterra5_table *table, int most
         if ((++passes >= most || !(size < previous)) && !solved) return 0;
         previous = size;
     }
+    for (int stage = 0; stage < 1; ++stage)
+        if (!volterra5_near_lanes(model[stage].y, s->x)) return 0;
     for (int i = 0; i < 5; ++i)
         if (!isfinite(x[i])) return 0;
     memcpy(s->x, x, sizeof x);
@@ -1430,19 +1453,26 @@ static void volterra5_group_advance(volterra5_lanes x[restrict 5], volterra5_lan
     }
 }
 
-/* Members that failed, or whose state is not finite, keep the state before the step, and leave. How many stay. */
+/* Members that failed, or whose state is not near the one before the step or not finite, keep that one, and leave. How many
+   stay. */
 static int volterra5_group_leave(volterra5_group *group, volterra5_lanes x[5], volterra5_lanes carry[5],
     size_t remaining)
 {
-    volterra5_lanes size = { 0.0 };
+    volterra5_lanes moved = { 0.0 }, size = { 0.0 }, bad;
     int active = 0;
-    for (int i = 0; i < 5; ++i)
-        for (int lane = 0; lane < volterra5_LANES; ++lane) size[lane] += fabs(group->x[i][lane]);
+    for (int i = 0; i < 5; ++i) {
+        volterra5_EACH_LANE
+        for (int lane = 0; lane < volterra5_LANES; ++lane) {
+            moved[lane] += fabs(group->x[i][lane] - x[i][lane]);
+            size[lane] += fabs(x[i][lane]);
+        }
+    }
+    for (int lane = 0; lane < volterra5_LANES; ++lane) bad[lane] = moved[lane] <= 4.0 * size[lane] ? 0.0 : 1.0;
     for (int lane = 0; lane < volterra5_LANES; ++lane) active += group->active[lane];
-    if (active == volterra5_LANES && volterra5_largest(size) < HUGE_VAL) return active;
+    if (active == volterra5_LANES && !(volterra5_largest(bad) > 0.0)) return active;
     active = 0;
     for (int lane = 0; lane < volterra5_LANES; ++lane) {
-        group->active[lane] = group->active[lane] && isfinite(size[lane]);
+        group->active[lane] = group->active[lane] && !(bad[lane] > 0.0);
         active += group->active[lane];
         for (int i = 0; i < 5 && !group->active[lane]; ++i) {
             group->x[i][lane] = x[i][lane];

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 7ff8be082ac07fb4f2411bb929b48c541baf9eff1c77d56836d512813ce6cb8c
+ * body-sha256: af138526091245808bd48f46e7bf0ecfc1268b17a3a425fc096e53630e7835a2
  */
 #include "vortices3.h"
 
@@ -939,6 +939,26 @@ static void vortices3_remember(vortices3_memory *memory, const double value[6], 
     if (memory->slow > memory->patience && memory->count >= 95) vortices3_fit(memory);
 }
 
+/* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved by a point far
+   away, at another energy, that has nothing to do with it. */
+static int vortices3_plausible(const vortices3_solver *s, int stage, const double increment[6])
+{
+    double moved = 0.0, size = 0.0, field[6], end[6];
+    for (int i = 0; i < 6; ++i) {
+        moved += fabs(increment[i]);
+        size += fabs(s->x[i]);
+    }
+    if (moved <= 2.0 * size) return 1;
+    vortices3_vector_field(&s->params, s->x, field);
+    for (int i = 0; i < 6; ++i) {
+        size += fabs(vortices3_fractions[stage] * s->h * field[i]);
+        end[i] = s->x[i] + increment[i];
+    }
+    if (moved <= 2.0 * size) return 1;
+    const double before = vortices3_hamiltonian(&s->params, s->x), after = vortices3_hamiltonian(&s->params, end);
+    return fabs(after - before) <= 0.5 * (fabs(before) + fabs(after));
+}
+
 /* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last
    bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the
    sum is not finite. */
@@ -999,6 +1019,7 @@ static vortices3_status vortices3_attempt(vortices3_solver *s, int stage)
             double correction[6] = { 0.0 };
             for (int i = 0; i < 6; ++i)
                 for (int j = 0; j < 6; ++j) correction[i] -= increment_jacobian[i * 6 + j] * delta[j];
+            if (!vortices3_plausible(s, stage, increment)) return vortices3_NO_CONVERGENCE;
             if (!vortices3_advance(s, increment, correction)) return vortices3_NOT_FINITE;
             vortices3_remember(memory, y, iteration + 1);
             return vortices3_OK;
@@ -2179,6 +2200,8 @@ static int vortices3_block(vortices3_solver *s, vortices3_table *table, int most
         if ((++passes >= most || !(size < previous)) && !solved) return 0;
         previous = size;
     }
+    for (int stage = 0; stage < 1; ++stage)
+        if (!vortices3_near_lanes(model[stage].y, s->x)) return 0;
     for (int i = 0; i < 6; ++i)
         if (!isfinite(x[i])) return 0;
     memcpy(s->x, x, sizeof x);
@@ -2483,19 +2506,26 @@ static void vortices3_group_advance(vortices3_lanes x[restrict 6], vortices3_lan
     }
 }
 
-/* Members that failed, or whose state is not finite, keep the state before the step, and leave. How many stay. */
+/* Members that failed, or whose state is not near the one before the step or not finite, keep that one, and leave. How many
+   stay. */
 static int vortices3_group_leave(vortices3_group *group, vortices3_lanes x[6], vortices3_lanes carry[6],
     size_t remaining)
 {
-    vortices3_lanes size = { 0.0 };
+    vortices3_lanes moved = { 0.0 }, size = { 0.0 }, bad;
     int active = 0;
-    for (int i = 0; i < 6; ++i)
-        for (int lane = 0; lane < vortices3_LANES; ++lane) size[lane] += fabs(group->x[i][lane]);
+    for (int i = 0; i < 6; ++i) {
+        vortices3_EACH_LANE
+        for (int lane = 0; lane < vortices3_LANES; ++lane) {
+            moved[lane] += fabs(group->x[i][lane] - x[i][lane]);
+            size[lane] += fabs(x[i][lane]);
+        }
+    }
+    for (int lane = 0; lane < vortices3_LANES; ++lane) bad[lane] = moved[lane] <= 4.0 * size[lane] ? 0.0 : 1.0;
     for (int lane = 0; lane < vortices3_LANES; ++lane) active += group->active[lane];
-    if (active == vortices3_LANES && vortices3_largest(size) < HUGE_VAL) return active;
+    if (active == vortices3_LANES && !(vortices3_largest(bad) > 0.0)) return active;
     active = 0;
     for (int lane = 0; lane < vortices3_LANES; ++lane) {
-        group->active[lane] = group->active[lane] && isfinite(size[lane]);
+        group->active[lane] = group->active[lane] && !(bad[lane] > 0.0);
         active += group->active[lane];
         for (int i = 0; i < 6 && !group->active[lane]; ++i) {
             group->x[i][lane] = x[i][lane];

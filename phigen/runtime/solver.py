@@ -225,7 +225,7 @@ class Solver:
             shown = ", ".join(map(str, error.members[:5])) + (", …" if len(error.members) > 5 else "")
             where += f" for {len(error.members)} member(s) of the ensemble ({shown})"
         elif error.step >= 0 and isinstance(trajectory, Trajectory):
-            where += f" at t = {error.step * h!r}"
+            where += f" at t = {error.step * h:.12g}"
         message = f"{where}: {error.status}" + (f", {_ADVICE[error.status]}" if error.status in _ADVICE else "")
         return StepError(message, step=error.step, status=error.status, trajectory=trajectory, members=error.members)
 

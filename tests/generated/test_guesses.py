@@ -2,8 +2,11 @@
 
 import numpy as np
 import pytest
+from support import compile_text
 
 from phigen import api, resources
+from phigen.api import solver_of
+from phigen.errors import StepError
 
 
 @pytest.mark.parametrize("stride", [1, 8, 20000])
@@ -21,3 +24,29 @@ def test_guesses_near_a_saddle_lead_members_of_ensembles_nowhere_else():
     ends = solver.ensemble(start, h=0.6, steps=20000)
     energies = [[solver.hamiltonian(x) for x in states] for states in (start, ends)]
     np.testing.assert_allclose(energies[1], energies[0], rtol=1e-8)
+
+
+RATTLEBACK = """
+coordinates: [pitch, roll, spin]
+poisson: {brackets: {pitch: {spin: 4*pitch}, roll: {spin: -roll}}}
+hamiltonian: (pitch**2 + roll**2 + spin**2)/2
+order: 6
+"""
+
+
+def test_steps_that_are_too_large_lead_nowhere_else():
+    """At step 0.5 the equation of a reversal has a solution far away too, of a hundred times the energy."""
+    solver = solver_of(compile_text(RATTLEBACK), "c")
+    start = [0.01, 0.5, -1]
+    for stride in (1, 8, 40):
+        with pytest.raises(StepError) as failure:
+            solver.integrate(start, h=0.5, steps=600, stride=stride)
+        energy = failure.value.trajectory.energy
+        assert len(energy) > 0
+        assert np.max(energy) < 2 * energy[0]
+    members = np.array([[0.01, 0.5, -1 + 0.01 * k] for k in range(11)])
+    with pytest.raises(StepError) as failure:
+        solver.ensemble(members, h=0.5, steps=600)
+    energies = np.array([solver.hamiltonian(x) for x in failure.value.trajectory])
+    assert len(failure.value.members) > 5
+    assert np.max(energies) < 2 * energies.min()

@@ -36,6 +36,9 @@ GROUP_REPAY = 200
 #: How far from the last value a guess may be, in sizes of that value.
 REACH = 4.0
 
+#: How far a step may lead, in sizes of the state and of what the vector field says.
+PLAUSIBLE = 2.0
+
 #: Values that the history of a solver may hold in all.
 MOST_HISTORY = 8_000
 
@@ -120,6 +123,7 @@ def _memory_values(program: Program) -> dict[str, Any]:
         "kept": 2 * fitted,
         "repay": REPAY,
         "reach": repr(REACH),
+        "plausible": repr(PLAUSIBLE),
         "most_repay": 4 * REPAY,
         "group_repay": GROUP_REPAY * program.dimension,
         "window": window,
@@ -230,6 +234,7 @@ def _body(program: Program) -> str:
         if "eliminate" in kernels:
             pieces += [static("eliminate"), _render("unrolled.c", values)]
         pieces += [_render(f"{template}.c", values) for template in ("remember", "project", "train", "learn")]
+        pieces.append(_render("plausible.c", values))
     if program.driver != "splitting" or program.extras.tangent:
         pieces.append(_render("advance.c", values))
     if program.path:
