@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: dcb81b5d8709c24baefd794d1c08ac678c470a0a024b9afea8d43146cd413573
+ * body-sha256: 53404512addf8ca57770904156d8264b99b8b377e5d23f4fae23e7a84f1b8bac
  */
 #include "ablowitz_ladik3.h"
 
@@ -240,7 +240,7 @@ static void ablowitz_ladik3_project(int rows, double (*one)[8], int column, doub
 /* By how much recurrences miss the last of these values. */
 static double ablowitz_ladik3_missed(const double *value, double (*weight)[8])
 {
-    enum { AHEAD = 1, WINDOW = 32, CHECKS = 8 };
+    enum { AHEAD = 1, WINDOW = 40, CHECKS = 8 };
     double most = 0.0;
     for (int i = 0; i < CHECKS; ++i) {
         double guess[8] = { 0.0 };
@@ -257,24 +257,24 @@ static double ablowitz_ladik3_missed(const double *value, double (*weight)[8])
    not foresee the last values, which they were not fitted to. */
 static int ablowitz_ladik3_train(ablowitz_ladik3_memory *memory, int component)
 {
-    enum { AHEAD = 1, WINDOW = 32, ROWS = 56 };
+    enum { AHEAD = 1, WINDOW = 40, ROWS = 64 };
     double q[WINDOW / 8][ROWS + WINDOW][8], r[WINDOW / 8][WINDOW][8], inverse[WINDOW]; /* eight columns in each part */
-    double right[ROWS + WINDOW][8], weight[WINDOW][8], value[96], largest = 0.0, left = HUGE_VAL;
+    double right[ROWS + WINDOW][8], weight[WINDOW][8], value[112], largest = 0.0, left = HUGE_VAL;
     int terms = 0;
     memset(q, 0, sizeof q);
     memset(right, 0, sizeof right);
     memset(weight, 0, sizeof weight);
-    for (int i = 0; i < 96; ++i) {
-        value[i] = memory->past[memory->count - 96 + i][component];
+    for (int i = 0; i < 112; ++i) {
+        value[i] = memory->past[memory->count - 112 + i][component];
         if (fabs(value[i]) > largest) largest = fabs(value[i]);
     }
     for (int i = 0; i < ROWS; ++i)
         for (int l = 0; l < AHEAD; ++l) right[i][l] = value[i + WINDOW + l];
-    while (terms < WINDOW && left > 1e-12 * largest) {
+    while (terms < WINDOW && left > 3e-12 * largest) {
         const int part = terms / 8, rows = ROWS + terms + 8; /* further rows of the ridge are zero in these columns */
         for (int i = 0; i < ROWS; ++i)
             for (int l = 0; l < 8; ++l) q[part][i][l] = value[i + WINDOW - 1 - terms - l];
-        for (int l = 0; l < 8; ++l) q[part][ROWS + terms + l][l] = 1e-13 * largest;
+        for (int l = 0; l < 8; ++l) q[part][ROWS + terms + l][l] = 1e-15 * largest;
         for (int k = 0; k < terms; ++k) ablowitz_ladik3_project(rows, q[k / 8], k % 8, &inverse[k], q[part], r[part][k]);
         for (int l = 0; l < 8; ++l, ++terms) {
             ablowitz_ladik3_project(rows, q[part], l, &inverse[terms], q[part], r[part][terms]);
@@ -296,9 +296,9 @@ static int ablowitz_ladik3_train(ablowitz_ladik3_memory *memory, int component)
 /* Drop what is old, if so many values would not fit into the history. */
 static void ablowitz_ladik3_make_room(ablowitz_ladik3_memory *memory, int values)
 {
-    if (memory->count + values <= 192) return;
-    memmove(memory->past, memory->past + memory->count - 96, 96 * sizeof memory->past[0]);
-    memory->count = 96;
+    if (memory->count + values <= 224) return;
+    memmove(memory->past, memory->past + memory->count - 112, 112 * sizeof memory->past[0]);
+    memory->count = 112;
 }
 
 /* Add a value to the history. */
@@ -331,7 +331,7 @@ static void ablowitz_ladik3_remember(ablowitz_ladik3_memory *memory, const doubl
     if (iterations > 1) ablowitz_ladik3_judge(memory, value);
     ablowitz_ladik3_record(memory, value);
     memory->slow = iterations > 1 ? memory->slow + 1 : 0;
-    if (memory->slow > memory->patience && memory->count >= 96) ablowitz_ladik3_fit(memory);
+    if (memory->slow > memory->patience && memory->count >= 112) ablowitz_ladik3_fit(memory);
 }
 
 /* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved by a point far

@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 67bb282e4ce8bf837f0e89008c2b277fbad735cbcf1899c804fe57af67a01f4f
+ * body-sha256: 86cd22de7b5d91600de2b33bc66103016abb6e9e920e4d84409cf9710998e19d
  */
 #ifndef ABLOWITZ_LADIK3_H
 #define ABLOWITZ_LADIK3_H
@@ -47,7 +47,7 @@ typedef enum {
 } ablowitz_ladik3_status;
 
 /* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
-   fitted to the last 96 values. They affect speed only. */
+   fitted to the last 112 values. They affect speed only. */
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
@@ -56,8 +56,8 @@ typedef struct {
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */
     int patience; /* how many of those before the recurrence is fitted again */
-    double past[192][ablowitz_ladik3_DIM]; /* values, the latest last */
-    double weight[32][ablowitz_ladik3_DIM][1]; /* of past values, the latest first, for the next value */
+    double past[224][ablowitz_ladik3_DIM]; /* values, the latest last */
+    double weight[40][ablowitz_ladik3_DIM][1]; /* of past values, the latest first, for the next value */
 } ablowitz_ladik3_memory;
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with ablowitz_ladik3_init. */

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 382d13f002262e2f83cb8dc954bb4f19dc05b36c8327b16be96ed876c572c5ff
+ * body-sha256: fd3f5e6505e77c59967e02f500d0829a00420de3908f1b92cea4abc41fadc867
  */
 #include "charged_particle.h"
 
@@ -256,7 +256,7 @@ static void charged_particle_project(int rows, double (*one)[8], int column, dou
 /* By how much recurrences miss the last of these values. */
 static double charged_particle_missed(const double *value, double (*weight)[8])
 {
-    enum { AHEAD = 1, WINDOW = 32, CHECKS = 8 };
+    enum { AHEAD = 1, WINDOW = 40, CHECKS = 8 };
     double most = 0.0;
     for (int i = 0; i < CHECKS; ++i) {
         double guess[8] = { 0.0 };
@@ -273,24 +273,24 @@ static double charged_particle_missed(const double *value, double (*weight)[8])
    not foresee the last values, which they were not fitted to. */
 static int charged_particle_train(charged_particle_memory *memory, int component)
 {
-    enum { AHEAD = 1, WINDOW = 32, ROWS = 56 };
+    enum { AHEAD = 1, WINDOW = 40, ROWS = 64 };
     double q[WINDOW / 8][ROWS + WINDOW][8], r[WINDOW / 8][WINDOW][8], inverse[WINDOW]; /* eight columns in each part */
-    double right[ROWS + WINDOW][8], weight[WINDOW][8], value[96], largest = 0.0, left = HUGE_VAL;
+    double right[ROWS + WINDOW][8], weight[WINDOW][8], value[112], largest = 0.0, left = HUGE_VAL;
     int terms = 0;
     memset(q, 0, sizeof q);
     memset(right, 0, sizeof right);
     memset(weight, 0, sizeof weight);
-    for (int i = 0; i < 96; ++i) {
-        value[i] = memory->past[memory->count - 96 + i][component];
+    for (int i = 0; i < 112; ++i) {
+        value[i] = memory->past[memory->count - 112 + i][component];
         if (fabs(value[i]) > largest) largest = fabs(value[i]);
     }
     for (int i = 0; i < ROWS; ++i)
         for (int l = 0; l < AHEAD; ++l) right[i][l] = value[i + WINDOW + l];
-    while (terms < WINDOW && left > 1e-12 * largest) {
+    while (terms < WINDOW && left > 3e-12 * largest) {
         const int part = terms / 8, rows = ROWS + terms + 8; /* further rows of the ridge are zero in these columns */
         for (int i = 0; i < ROWS; ++i)
             for (int l = 0; l < 8; ++l) q[part][i][l] = value[i + WINDOW - 1 - terms - l];
-        for (int l = 0; l < 8; ++l) q[part][ROWS + terms + l][l] = 1e-13 * largest;
+        for (int l = 0; l < 8; ++l) q[part][ROWS + terms + l][l] = 1e-15 * largest;
         for (int k = 0; k < terms; ++k) charged_particle_project(rows, q[k / 8], k % 8, &inverse[k], q[part], r[part][k]);
         for (int l = 0; l < 8; ++l, ++terms) {
             charged_particle_project(rows, q[part], l, &inverse[terms], q[part], r[part][terms]);
@@ -312,9 +312,9 @@ static int charged_particle_train(charged_particle_memory *memory, int component
 /* Drop what is old, if so many values would not fit into the history. */
 static void charged_particle_make_room(charged_particle_memory *memory, int values)
 {
-    if (memory->count + values <= 192) return;
-    memmove(memory->past, memory->past + memory->count - 96, 96 * sizeof memory->past[0]);
-    memory->count = 96;
+    if (memory->count + values <= 224) return;
+    memmove(memory->past, memory->past + memory->count - 112, 112 * sizeof memory->past[0]);
+    memory->count = 112;
 }
 
 /* Add a value to the history. */
@@ -347,7 +347,7 @@ static void charged_particle_remember(charged_particle_memory *memory, const dou
     if (iterations > 1) charged_particle_judge(memory, value);
     charged_particle_record(memory, value);
     memory->slow = iterations > 1 ? memory->slow + 1 : 0;
-    if (memory->slow > memory->patience && memory->count >= 96) charged_particle_fit(memory);
+    if (memory->slow > memory->patience && memory->count >= 112) charged_particle_fit(memory);
 }
 
 /* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved by a point far

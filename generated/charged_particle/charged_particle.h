@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 3c58ee02b1e2104f4494363aa1607e64d0021c19fef00473f7105282a9b56059
+ * body-sha256: be5afcd07288540d67eac638212c0f9ba12e2a27fbe0cd085154fcfb1ba151c6
  */
 #ifndef CHARGED_PARTICLE_H
 #define CHARGED_PARTICLE_H
@@ -46,7 +46,7 @@ typedef enum {
 } charged_particle_status;
 
 /* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
-   fitted to the last 96 values. They affect speed only. */
+   fitted to the last 112 values. They affect speed only. */
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
@@ -55,8 +55,8 @@ typedef struct {
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */
     int patience; /* how many of those before the recurrence is fitted again */
-    double past[192][charged_particle_DIM]; /* values, the latest last */
-    double weight[32][charged_particle_DIM][1]; /* of past values, the latest first, for the next value */
+    double past[224][charged_particle_DIM]; /* values, the latest last */
+    double weight[40][charged_particle_DIM][1]; /* of past values, the latest first, for the next value */
 } charged_particle_memory;
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with charged_particle_init. */

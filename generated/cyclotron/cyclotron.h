@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: abb68f2b12b4f902d509028b4f4b2c1721d17e1166dfe3b985f54d12de55579c
+ * body-sha256: 786eed7f89b1a20c36699be0baf31dad5b823ca58c681d578a3e7d4f445eb50b
  */
 #ifndef CYCLOTRON_H
 #define CYCLOTRON_H
@@ -46,7 +46,7 @@ typedef enum {
 } cyclotron_status;
 
 /* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
-   fitted to the last 95 values. They affect speed only. */
+   fitted to the last 111 values. They affect speed only. */
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
@@ -55,8 +55,8 @@ typedef struct {
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */
     int patience; /* how many of those before the recurrence is fitted again */
-    double past[190][cyclotron_DIM]; /* values, the latest last */
-    double weight[32][cyclotron_DIM][8]; /* of past values, the latest first, for the next values */
+    double past[222][cyclotron_DIM]; /* values, the latest last */
+    double weight[40][cyclotron_DIM][8]; /* of past values, the latest first, for the next values */
 } cyclotron_memory;
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with cyclotron_init. */

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 3568d1a0cc59c33b8a546beed12668c49a4812fe1f944908c36d0fe5c1d274ff
+ * body-sha256: 26383a9c4db0446d85c449cb4ab0e15b9d92c175bd65737a9d7c7f396e276af1
  */
 #ifndef ENGEL_GEODESICS_H
 #define ENGEL_GEODESICS_H
@@ -46,7 +46,7 @@ typedef enum {
 } engel_geodesics_status;
 
 /* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
-   fitted to the last 95 values. They affect speed only. */
+   fitted to the last 111 values. They affect speed only. */
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
@@ -55,8 +55,8 @@ typedef struct {
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */
     int patience; /* how many of those before the recurrence is fitted again */
-    double past[190][engel_geodesics_DIM]; /* values, the latest last */
-    double weight[32][engel_geodesics_DIM][8]; /* of past values, the latest first, for the next values */
+    double past[222][engel_geodesics_DIM]; /* values, the latest last */
+    double weight[40][engel_geodesics_DIM][8]; /* of past values, the latest first, for the next values */
 } engel_geodesics_memory;
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with engel_geodesics_init. */

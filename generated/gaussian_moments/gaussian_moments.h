@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 69edba38730acb58d9fde6216c623095b08618e72d6121462d716897057d8685
+ * body-sha256: 7bbe4e26faaa05c1340e56b58727444c5cbcfd3e7ddd36e0e555bc0aefa811ba
  */
 #ifndef GAUSSIAN_MOMENTS_H
 #define GAUSSIAN_MOMENTS_H
@@ -47,7 +47,7 @@ typedef enum {
 } gaussian_moments_status;
 
 /* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
-   fitted to the last 95 values. They affect speed only. */
+   fitted to the last 111 values. They affect speed only. */
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
@@ -56,8 +56,8 @@ typedef struct {
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */
     int patience; /* how many of those before the recurrence is fitted again */
-    double past[190][gaussian_moments_DIM]; /* values, the latest last */
-    double weight[32][gaussian_moments_DIM][8]; /* of past values, the latest first, for the next values */
+    double past[222][gaussian_moments_DIM]; /* values, the latest last */
+    double weight[40][gaussian_moments_DIM][8]; /* of past values, the latest first, for the next values */
 } gaussian_moments_memory;
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with gaussian_moments_init. */

@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 78c6f430ed09d9874a62fccdce5869dfae75721ea391e64358689fbf91ba83fb
+ * body-sha256: c54bd5462a146f837d670e87f09e4091904583efb895e66e1c1cf25471aad434
  */
 #include "guiding_centre.h"
 
@@ -258,7 +258,7 @@ static void guiding_centre_project(int rows, double (*one)[8], int column, doubl
 /* By how much recurrences miss the last of these values. */
 static double guiding_centre_missed(const double *value, double (*weight)[8])
 {
-    enum { AHEAD = 8, WINDOW = 32, CHECKS = 8 };
+    enum { AHEAD = 8, WINDOW = 40, CHECKS = 8 };
     double most = 0.0;
     for (int i = 0; i < CHECKS; ++i) {
         double guess[8] = { 0.0 };
@@ -275,24 +275,24 @@ static double guiding_centre_missed(const double *value, double (*weight)[8])
    not foresee the last values, which they were not fitted to. */
 static int guiding_centre_train(guiding_centre_memory *memory, int component)
 {
-    enum { AHEAD = 8, WINDOW = 32, ROWS = 48 };
+    enum { AHEAD = 8, WINDOW = 40, ROWS = 56 };
     double q[WINDOW / 8][ROWS + WINDOW][8], r[WINDOW / 8][WINDOW][8], inverse[WINDOW]; /* eight columns in each part */
-    double right[ROWS + WINDOW][8], weight[WINDOW][8], value[95], largest = 0.0, left = HUGE_VAL;
+    double right[ROWS + WINDOW][8], weight[WINDOW][8], value[111], largest = 0.0, left = HUGE_VAL;
     int terms = 0;
     memset(q, 0, sizeof q);
     memset(right, 0, sizeof right);
     memset(weight, 0, sizeof weight);
-    for (int i = 0; i < 95; ++i) {
-        value[i] = memory->past[memory->count - 95 + i][component];
+    for (int i = 0; i < 111; ++i) {
+        value[i] = memory->past[memory->count - 111 + i][component];
         if (fabs(value[i]) > largest) largest = fabs(value[i]);
     }
     for (int i = 0; i < ROWS; ++i)
         for (int l = 0; l < AHEAD; ++l) right[i][l] = value[i + WINDOW + l];
-    while (terms < WINDOW && left > 1e-12 * largest) {
+    while (terms < WINDOW && left > 3e-12 * largest) {
         const int part = terms / 8, rows = ROWS + terms + 8; /* further rows of the ridge are zero in these columns */
         for (int i = 0; i < ROWS; ++i)
             for (int l = 0; l < 8; ++l) q[part][i][l] = value[i + WINDOW - 1 - terms - l];
-        for (int l = 0; l < 8; ++l) q[part][ROWS + terms + l][l] = 1e-13 * largest;
+        for (int l = 0; l < 8; ++l) q[part][ROWS + terms + l][l] = 1e-15 * largest;
         for (int k = 0; k < terms; ++k) guiding_centre_project(rows, q[k / 8], k % 8, &inverse[k], q[part], r[part][k]);
         for (int l = 0; l < 8; ++l, ++terms) {
             guiding_centre_project(rows, q[part], l, &inverse[terms], q[part], r[part][terms]);
@@ -314,9 +314,9 @@ static int guiding_centre_train(guiding_centre_memory *memory, int component)
 /* Drop what is old, if so many values would not fit into the history. */
 static void guiding_centre_make_room(guiding_centre_memory *memory, int values)
 {
-    if (memory->count + values <= 190) return;
-    memmove(memory->past, memory->past + memory->count - 95, 95 * sizeof memory->past[0]);
-    memory->count = 95;
+    if (memory->count + values <= 222) return;
+    memmove(memory->past, memory->past + memory->count - 111, 111 * sizeof memory->past[0]);
+    memory->count = 111;
 }
 
 /* Add a value to the history. */
@@ -349,7 +349,7 @@ static void guiding_centre_remember(guiding_centre_memory *memory, const double 
     if (iterations > 1) guiding_centre_judge(memory, value);
     guiding_centre_record(memory, value);
     memory->slow = iterations > 1 ? memory->slow + 1 : 0;
-    if (memory->slow > memory->patience && memory->count >= 95) guiding_centre_fit(memory);
+    if (memory->slow > memory->patience && memory->count >= 111) guiding_centre_fit(memory);
 }
 
 /* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved by a point far
@@ -784,7 +784,7 @@ typedef double guiding_centre_lanes[guiding_centre_LANES];
 /* What all blocks share: coefficients, the same in each lane, and the recurrences by which they are foreseen. */
 typedef struct {
     int fits[5]; /* the fit that weight is of; -1 for none */
-    guiding_centre_lanes coef[5][5], weight[5][32][4];
+    guiding_centre_lanes coef[5][5], weight[5][40][4];
 } guiding_centre_table;
 
 /* A stage in all lanes, linearised around y. */
@@ -2636,7 +2636,7 @@ static void guiding_centre_give_up(guiding_centre_solver *s)
 static void guiding_centre_choose_guess(guiding_centre_solver *s, size_t steps)
 {
     for (int stage = 0; stage < 5; ++stage)
-        if (s->memory[stage].count < 95) {
+        if (s->memory[stage].count < 111) {
             s->foreseeing = 0;
             return;
         }

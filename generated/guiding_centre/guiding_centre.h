@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 353b4e4fb45b76f57986068fca086f4faba8419de715ff5af18a4db47faf3cba
+ * body-sha256: 4f20c75e9fb9810be84bc4622b5bda9907c8ebc39170dd2b85f5c283f4d8967a
  */
 #ifndef GUIDING_CENTRE_H
 #define GUIDING_CENTRE_H
@@ -49,7 +49,7 @@ typedef enum {
 } guiding_centre_status;
 
 /* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
-   fitted to the last 95 values. They affect speed only. */
+   fitted to the last 111 values. They affect speed only. */
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
@@ -58,8 +58,8 @@ typedef struct {
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */
     int patience; /* how many of those before the recurrence is fitted again */
-    double past[190][guiding_centre_DIM]; /* values, the latest last */
-    double weight[32][guiding_centre_DIM][8]; /* of past values, the latest first, for the next values */
+    double past[222][guiding_centre_DIM]; /* values, the latest last */
+    double weight[40][guiding_centre_DIM][8]; /* of past values, the latest first, for the next values */
 } guiding_centre_memory;
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with guiding_centre_init. */

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: ecb1f89b4c082a7d67dd417bb03382f099c0cff8dd00124fb82972bff0976d45
+ * body-sha256: 2a7396d8993433b78bb09179d2ab067d4c0117d79db0fedf7b626eb030f5ed5c
  */
 #ifndef HARMONIC_OSCILLATOR_H
 #define HARMONIC_OSCILLATOR_H
@@ -47,7 +47,7 @@ typedef enum {
 } harmonic_oscillator_status;
 
 /* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
-   fitted to the last 95 values. They affect speed only. */
+   fitted to the last 111 values. They affect speed only. */
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
@@ -56,8 +56,8 @@ typedef struct {
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */
     int patience; /* how many of those before the recurrence is fitted again */
-    double past[190][harmonic_oscillator_DIM]; /* values, the latest last */
-    double weight[32][harmonic_oscillator_DIM][8]; /* of past values, the latest first, for the next values */
+    double past[222][harmonic_oscillator_DIM]; /* values, the latest last */
+    double weight[40][harmonic_oscillator_DIM][8]; /* of past values, the latest first, for the next values */
 } harmonic_oscillator_memory;
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with harmonic_oscillator_init. */

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: bbec691a2eb20319f2be5a353c151aee24dd721f6d2f5a99245fc4138b9e9e40
+ * body-sha256: 99c8dc360ac613615309d202fcae7a77e785c4f097c26394603d9458de5a4005
  */
 #ifndef HENON_HEILES_H
 #define HENON_HEILES_H
@@ -46,7 +46,7 @@ typedef enum {
 } henon_heiles_status;
 
 /* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
-   fitted to the last 95 values. They affect speed only. */
+   fitted to the last 111 values. They affect speed only. */
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
@@ -55,8 +55,8 @@ typedef struct {
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */
     int patience; /* how many of those before the recurrence is fitted again */
-    double past[190][henon_heiles_DIM]; /* values, the latest last */
-    double weight[32][henon_heiles_DIM][8]; /* of past values, the latest first, for the next values */
+    double past[222][henon_heiles_DIM]; /* values, the latest last */
+    double weight[40][henon_heiles_DIM][8]; /* of past values, the latest first, for the next values */
 } henon_heiles_memory;
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with henon_heiles_init. */

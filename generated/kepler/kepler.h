@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: ade19c0333820229dd82f44a6ecda9f128b9422f7975371dd1a01c59111f6bd8
+ * body-sha256: 8232752118d76ce2c59d6039288459d40694b2a94cdd89febd48252b429e0c90
  */
 #ifndef KEPLER_H
 #define KEPLER_H
@@ -46,7 +46,7 @@ typedef enum {
 } kepler_status;
 
 /* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
-   fitted to the last 95 values. They affect speed only. */
+   fitted to the last 111 values. They affect speed only. */
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
@@ -55,8 +55,8 @@ typedef struct {
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */
     int patience; /* how many of those before the recurrence is fitted again */
-    double past[190][kepler_DIM]; /* values, the latest last */
-    double weight[32][kepler_DIM][8]; /* of past values, the latest first, for the next values */
+    double past[222][kepler_DIM]; /* values, the latest last */
+    double weight[40][kepler_DIM][8]; /* of past values, the latest first, for the next values */
 } kepler_memory;
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with kepler_init. */

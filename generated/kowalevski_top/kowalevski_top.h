@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: c9560dbeaca1f0c1b5173c9863d22c9642ba09ca9951277fbada17e17ecb87e0
+ * body-sha256: 3bd2c0bbe4c86fad6007c73b4327a44f1c7d7e1faa97cdeabb33dce4100f90f2
  */
 #ifndef KOWALEVSKI_TOP_H
 #define KOWALEVSKI_TOP_H
@@ -46,7 +46,7 @@ typedef enum {
 } kowalevski_top_status;
 
 /* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
-   fitted to the last 95 values. They affect speed only. */
+   fitted to the last 111 values. They affect speed only. */
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
@@ -55,8 +55,8 @@ typedef struct {
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */
     int patience; /* how many of those before the recurrence is fitted again */
-    double past[190][kowalevski_top_DIM]; /* values, the latest last */
-    double weight[32][kowalevski_top_DIM][8]; /* of past values, the latest first, for the next values */
+    double past[222][kowalevski_top_DIM]; /* values, the latest last */
+    double weight[40][kowalevski_top_DIM][8]; /* of past values, the latest first, for the next values */
 } kowalevski_top_memory;
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with kowalevski_top_init. */

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 6b501acafdc5118abce6ceba30053c8a094a15cf935302340aeda433f7992368
+ * body-sha256: ed6f48bd09b61e2b938723773c3e80d69e7dfd7b48964ff5ceab4a70c6cb2053
  */
 #ifndef LAGRANGE_TOP_H
 #define LAGRANGE_TOP_H
@@ -48,7 +48,7 @@ typedef enum {
 } lagrange_top_status;
 
 /* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
-   fitted to the last 95 values. They affect speed only. */
+   fitted to the last 111 values. They affect speed only. */
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
@@ -57,8 +57,8 @@ typedef struct {
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */
     int patience; /* how many of those before the recurrence is fitted again */
-    double past[190][lagrange_top_DIM]; /* values, the latest last */
-    double weight[32][lagrange_top_DIM][8]; /* of past values, the latest first, for the next values */
+    double past[222][lagrange_top_DIM]; /* values, the latest last */
+    double weight[40][lagrange_top_DIM][8]; /* of past values, the latest first, for the next values */
 } lagrange_top_memory;
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with lagrange_top_init. */

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 71b90fb5764068e81ac2992951e640d888422004d92da9bd6b2669d7ce90f23c
+ * body-sha256: 0b76ac43749ed739f14ded600d2fc8f84aca3a3e316de67afa837d7a341f2421
  */
 #ifndef LOTKA_VOLTERRA_H
 #define LOTKA_VOLTERRA_H
@@ -46,7 +46,7 @@ typedef enum {
 } lotka_volterra_status;
 
 /* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
-   fitted to the last 95 values. They affect speed only. */
+   fitted to the last 111 values. They affect speed only. */
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
@@ -55,8 +55,8 @@ typedef struct {
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */
     int patience; /* how many of those before the recurrence is fitted again */
-    double past[190][lotka_volterra_DIM]; /* values, the latest last */
-    double weight[32][lotka_volterra_DIM][8]; /* of past values, the latest first, for the next values */
+    double past[222][lotka_volterra_DIM]; /* values, the latest last */
+    double weight[40][lotka_volterra_DIM][8]; /* of past values, the latest first, for the next values */
 } lotka_volterra_memory;
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with lotka_volterra_init. */

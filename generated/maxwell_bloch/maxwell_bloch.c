@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 30d3e56a03ab7ad6415b0ad12399feca99eecdf5f797d76fa38dd379f58bf689
+ * body-sha256: bd210622a147e4ee94b7f237174b05e40b7240239fab171ad5dc6450ba1dddcc
  */
 #include "maxwell_bloch.h"
 
@@ -236,7 +236,7 @@ static void maxwell_bloch_project(int rows, double (*one)[8], int column, double
 /* By how much recurrences miss the last of these values. */
 static double maxwell_bloch_missed(const double *value, double (*weight)[8])
 {
-    enum { AHEAD = 8, WINDOW = 32, CHECKS = 8 };
+    enum { AHEAD = 8, WINDOW = 40, CHECKS = 8 };
     double most = 0.0;
     for (int i = 0; i < CHECKS; ++i) {
         double guess[8] = { 0.0 };
@@ -253,24 +253,24 @@ static double maxwell_bloch_missed(const double *value, double (*weight)[8])
    not foresee the last values, which they were not fitted to. */
 static int maxwell_bloch_train(maxwell_bloch_memory *memory, int component)
 {
-    enum { AHEAD = 8, WINDOW = 32, ROWS = 48 };
+    enum { AHEAD = 8, WINDOW = 40, ROWS = 56 };
     double q[WINDOW / 8][ROWS + WINDOW][8], r[WINDOW / 8][WINDOW][8], inverse[WINDOW]; /* eight columns in each part */
-    double right[ROWS + WINDOW][8], weight[WINDOW][8], value[95], largest = 0.0, left = HUGE_VAL;
+    double right[ROWS + WINDOW][8], weight[WINDOW][8], value[111], largest = 0.0, left = HUGE_VAL;
     int terms = 0;
     memset(q, 0, sizeof q);
     memset(right, 0, sizeof right);
     memset(weight, 0, sizeof weight);
-    for (int i = 0; i < 95; ++i) {
-        value[i] = memory->past[memory->count - 95 + i][component];
+    for (int i = 0; i < 111; ++i) {
+        value[i] = memory->past[memory->count - 111 + i][component];
         if (fabs(value[i]) > largest) largest = fabs(value[i]);
     }
     for (int i = 0; i < ROWS; ++i)
         for (int l = 0; l < AHEAD; ++l) right[i][l] = value[i + WINDOW + l];
-    while (terms < WINDOW && left > 1e-12 * largest) {
+    while (terms < WINDOW && left > 3e-12 * largest) {
         const int part = terms / 8, rows = ROWS + terms + 8; /* further rows of the ridge are zero in these columns */
         for (int i = 0; i < ROWS; ++i)
             for (int l = 0; l < 8; ++l) q[part][i][l] = value[i + WINDOW - 1 - terms - l];
-        for (int l = 0; l < 8; ++l) q[part][ROWS + terms + l][l] = 1e-13 * largest;
+        for (int l = 0; l < 8; ++l) q[part][ROWS + terms + l][l] = 1e-15 * largest;
         for (int k = 0; k < terms; ++k) maxwell_bloch_project(rows, q[k / 8], k % 8, &inverse[k], q[part], r[part][k]);
         for (int l = 0; l < 8; ++l, ++terms) {
             maxwell_bloch_project(rows, q[part], l, &inverse[terms], q[part], r[part][terms]);
@@ -292,9 +292,9 @@ static int maxwell_bloch_train(maxwell_bloch_memory *memory, int component)
 /* Drop what is old, if so many values would not fit into the history. */
 static void maxwell_bloch_make_room(maxwell_bloch_memory *memory, int values)
 {
-    if (memory->count + values <= 190) return;
-    memmove(memory->past, memory->past + memory->count - 95, 95 * sizeof memory->past[0]);
-    memory->count = 95;
+    if (memory->count + values <= 222) return;
+    memmove(memory->past, memory->past + memory->count - 111, 111 * sizeof memory->past[0]);
+    memory->count = 111;
 }
 
 /* Add a value to the history. */
@@ -327,7 +327,7 @@ static void maxwell_bloch_remember(maxwell_bloch_memory *memory, const double va
     if (iterations > 1) maxwell_bloch_judge(memory, value);
     maxwell_bloch_record(memory, value);
     memory->slow = iterations > 1 ? memory->slow + 1 : 0;
-    if (memory->slow > memory->patience && memory->count >= 95) maxwell_bloch_fit(memory);
+    if (memory->slow > memory->patience && memory->count >= 111) maxwell_bloch_fit(memory);
 }
 
 /* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved by a point far
@@ -507,7 +507,7 @@ typedef double maxwell_bloch_lanes[maxwell_bloch_LANES];
 /* What all blocks share: coefficients, the same in each lane, and the recurrences by which they are foreseen. */
 typedef struct {
     int fits[1]; /* the fit that weight is of; -1 for none */
-    maxwell_bloch_lanes coef[1][3], weight[1][32][3];
+    maxwell_bloch_lanes coef[1][3], weight[1][40][3];
 } maxwell_bloch_table;
 
 /* A stage in all lanes, linearised around y. */
@@ -904,7 +904,7 @@ static void maxwell_bloch_give_up(maxwell_bloch_solver *s)
 static void maxwell_bloch_choose_guess(maxwell_bloch_solver *s, size_t steps)
 {
     for (int stage = 0; stage < 1; ++stage)
-        if (s->memory[stage].count < 95) {
+        if (s->memory[stage].count < 111) {
             s->foreseeing = 0;
             return;
         }
@@ -970,8 +970,8 @@ maxwell_bloch_status maxwell_bloch_integrate(maxwell_bloch_solver *s, double h, 
 /* Members of an ensemble, each in its lane. */
 typedef struct {
     maxwell_bloch_lanes x[3], carry[3], coef[1][3];
-    maxwell_bloch_lanes past[1][95][3]; /* solved values, in a ring */
-    maxwell_bloch_lanes weight[1][32][3]; /* of past values, the latest first, for the next */
+    maxwell_bloch_lanes past[1][111][3]; /* solved values, in a ring */
+    maxwell_bloch_lanes weight[1][40][3]; /* of past values, the latest first, for the next */
     int latest;     /* the row of the latest values */
     int count;      /* rows in use */
     int order[1];   /* how many of them the extrapolation uses */
@@ -988,7 +988,7 @@ typedef struct {
 static maxwell_bloch_lanes *maxwell_bloch_group_past(maxwell_bloch_group *group, int stage, int k)
 {
     const int row = group->latest + k;
-    return group->past[stage][row < 95 ? row : row - 95];
+    return group->past[stage][row < 111 ? row : row - 111];
 }
 
 /* Guess the values of a stage by the recurrences of the members. */
@@ -1067,18 +1067,18 @@ static void maxwell_bloch_group_fit(maxwell_bloch_group *group)
 {
     maxwell_bloch_memory memory;
     const int helped = group->fits == 0 || group->fitting[0];
-    memory.count = 95;
+    memory.count = 111;
     for (int stage = 0; stage < 1; ++stage) {
         int found = 1;
         group->terms[stage] = 0;
         for (int lane = 0; lane < maxwell_bloch_LANES; ++lane)
             for (int i = 0; i < 3 && group->active[lane] && found; ++i) {
-                for (int k = 0; k < 95; ++k)
-                    memory.past[95 - 1 - k][i] = maxwell_bloch_group_past(group, stage, k)[i][lane];
+                for (int k = 0; k < 111; ++k)
+                    memory.past[111 - 1 - k][i] = maxwell_bloch_group_past(group, stage, k)[i][lane];
                 const int terms = maxwell_bloch_train(&memory, i);
                 found = terms > 0;
                 if (terms > group->terms[stage]) group->terms[stage] = terms;
-                for (int k = 0; k < 32; ++k) group->weight[stage][k][i][lane] = memory.weight[k][i][0];
+                for (int k = 0; k < 40; ++k) group->weight[stage][k][i][lane] = memory.weight[k][i][0];
             }
         if (!found) group->terms[stage] = 0;
         group->fitting[stage] = found;
@@ -1216,7 +1216,7 @@ static int maxwell_bloch_group_step(maxwell_bloch_group *group, size_t remaining
 {
     maxwell_bloch_lanes x[3], carry[3];
     maxwell_bloch_model model;
-    const int next = (group->latest > 0 ? group->latest : 95) - 1;
+    const int next = (group->latest > 0 ? group->latest : 111) - 1;
     int most = 0;
     memcpy(x, group->x, sizeof x);
     memcpy(carry, group->carry, sizeof carry);
@@ -1229,9 +1229,9 @@ static int maxwell_bloch_group_step(maxwell_bloch_group *group, size_t remaining
         memcpy(group->past[stage][next], model.y, sizeof model.y);
     }
     group->latest = next;
-    if (group->count < 95) ++group->count;
+    if (group->count < 111) ++group->count;
     group->slow = most > 1 ? group->slow + 1 : 0;
-    if (group->slow > group->patience && group->count == 95 && remaining >= 600)
+    if (group->slow > group->patience && group->count == 111 && remaining >= 600)
         maxwell_bloch_group_fit(group);
     return maxwell_bloch_group_leave(group, x, carry, remaining);
 }

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: faadd97e6f8e1ae13f85aa821e549310046f474049bde0e171e9819fc276bd61
+ * body-sha256: 5b3a2f224d3425fd10f13da28ac130b7f4a3d13210f9edfd4f2db95a5772f0ac
  */
 #ifndef MAXWELL_BLOCH_H
 #define MAXWELL_BLOCH_H
@@ -46,7 +46,7 @@ typedef enum {
 } maxwell_bloch_status;
 
 /* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
-   fitted to the last 95 values. They affect speed only. */
+   fitted to the last 111 values. They affect speed only. */
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
@@ -55,8 +55,8 @@ typedef struct {
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */
     int patience; /* how many of those before the recurrence is fitted again */
-    double past[190][maxwell_bloch_DIM]; /* values, the latest last */
-    double weight[32][maxwell_bloch_DIM][8]; /* of past values, the latest first, for the next values */
+    double past[222][maxwell_bloch_DIM]; /* values, the latest last */
+    double weight[40][maxwell_bloch_DIM][8]; /* of past values, the latest first, for the next values */
 } maxwell_bloch_memory;
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with maxwell_bloch_init. */

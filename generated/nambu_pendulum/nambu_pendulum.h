@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 685325ac4368dd9b7cfa02310bd7bd90adf41dbe147788e22ecde2e559598422
+ * body-sha256: e9e8e11111b662796bded01f5b040e34329c4727642a24b95deaf171cdf1e3a9
  */
 #ifndef NAMBU_PENDULUM_H
 #define NAMBU_PENDULUM_H
@@ -46,7 +46,7 @@ typedef enum {
 } nambu_pendulum_status;
 
 /* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
-   fitted to the last 95 values. They affect speed only. */
+   fitted to the last 111 values. They affect speed only. */
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
@@ -55,8 +55,8 @@ typedef struct {
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */
     int patience; /* how many of those before the recurrence is fitted again */
-    double past[190][nambu_pendulum_DIM]; /* values, the latest last */
-    double weight[32][nambu_pendulum_DIM][8]; /* of past values, the latest first, for the next values */
+    double past[222][nambu_pendulum_DIM]; /* values, the latest last */
+    double weight[40][nambu_pendulum_DIM][8]; /* of past values, the latest first, for the next values */
 } nambu_pendulum_memory;
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with nambu_pendulum_init. */

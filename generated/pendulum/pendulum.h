@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 1f017a01b2afdd64ebc249c1f402896c15cb226f3359c7fc30e1c023dee96468
+ * body-sha256: 89cb9d0e5df295a8a2aa1fdfc250b2c847cbfce39e95473c0ac661626c3dc578
  */
 #ifndef PENDULUM_H
 #define PENDULUM_H
@@ -46,7 +46,7 @@ typedef enum {
 } pendulum_status;
 
 /* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
-   fitted to the last 95 values. They affect speed only. */
+   fitted to the last 111 values. They affect speed only. */
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
@@ -55,8 +55,8 @@ typedef struct {
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */
     int patience; /* how many of those before the recurrence is fitted again */
-    double past[190][pendulum_DIM]; /* values, the latest last */
-    double weight[32][pendulum_DIM][8]; /* of past values, the latest first, for the next values */
+    double past[222][pendulum_DIM]; /* values, the latest last */
+    double weight[40][pendulum_DIM][8]; /* of past values, the latest first, for the next values */
 } pendulum_memory;
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with pendulum_init. */

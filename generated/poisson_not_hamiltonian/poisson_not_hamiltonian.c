@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: fab1debfa8c1ba745ee883ea6a9499d73becdf5c2e11930dae142d48c03ac1fd
+ * body-sha256: 059c641dd3107fe8cc9194db1e96c52b6b76d626c55f759c88c79aad49795d43
  */
 #include "poisson_not_hamiltonian.h"
 
@@ -345,7 +345,7 @@ static void poisson_not_hamiltonian_project(int rows, double (*one)[8], int colu
 /* By how much recurrences miss the last of these values. */
 static double poisson_not_hamiltonian_missed(const double *value, double (*weight)[8])
 {
-    enum { AHEAD = 8, WINDOW = 32, CHECKS = 8 };
+    enum { AHEAD = 8, WINDOW = 40, CHECKS = 8 };
     double most = 0.0;
     for (int i = 0; i < CHECKS; ++i) {
         double guess[8] = { 0.0 };
@@ -362,24 +362,24 @@ static double poisson_not_hamiltonian_missed(const double *value, double (*weigh
    not foresee the last values, which they were not fitted to. */
 static int poisson_not_hamiltonian_train(poisson_not_hamiltonian_memory *memory, int component)
 {
-    enum { AHEAD = 8, WINDOW = 32, ROWS = 48 };
+    enum { AHEAD = 8, WINDOW = 40, ROWS = 56 };
     double q[WINDOW / 8][ROWS + WINDOW][8], r[WINDOW / 8][WINDOW][8], inverse[WINDOW]; /* eight columns in each part */
-    double right[ROWS + WINDOW][8], weight[WINDOW][8], value[95], largest = 0.0, left = HUGE_VAL;
+    double right[ROWS + WINDOW][8], weight[WINDOW][8], value[111], largest = 0.0, left = HUGE_VAL;
     int terms = 0;
     memset(q, 0, sizeof q);
     memset(right, 0, sizeof right);
     memset(weight, 0, sizeof weight);
-    for (int i = 0; i < 95; ++i) {
-        value[i] = memory->past[memory->count - 95 + i][component];
+    for (int i = 0; i < 111; ++i) {
+        value[i] = memory->past[memory->count - 111 + i][component];
         if (fabs(value[i]) > largest) largest = fabs(value[i]);
     }
     for (int i = 0; i < ROWS; ++i)
         for (int l = 0; l < AHEAD; ++l) right[i][l] = value[i + WINDOW + l];
-    while (terms < WINDOW && left > 1e-12 * largest) {
+    while (terms < WINDOW && left > 3e-12 * largest) {
         const int part = terms / 8, rows = ROWS + terms + 8; /* further rows of the ridge are zero in these columns */
         for (int i = 0; i < ROWS; ++i)
             for (int l = 0; l < 8; ++l) q[part][i][l] = value[i + WINDOW - 1 - terms - l];
-        for (int l = 0; l < 8; ++l) q[part][ROWS + terms + l][l] = 1e-13 * largest;
+        for (int l = 0; l < 8; ++l) q[part][ROWS + terms + l][l] = 1e-15 * largest;
         for (int k = 0; k < terms; ++k) poisson_not_hamiltonian_project(rows, q[k / 8], k % 8, &inverse[k], q[part], r[part][k]);
         for (int l = 0; l < 8; ++l, ++terms) {
             poisson_not_hamiltonian_project(rows, q[part], l, &inverse[terms], q[part], r[part][terms]);
@@ -401,9 +401,9 @@ static int poisson_not_hamiltonian_train(poisson_not_hamiltonian_memory *memory,
 /* Drop what is old, if so many values would not fit into the history. */
 static void poisson_not_hamiltonian_make_room(poisson_not_hamiltonian_memory *memory, int values)
 {
-    if (memory->count + values <= 190) return;
-    memmove(memory->past, memory->past + memory->count - 95, 95 * sizeof memory->past[0]);
-    memory->count = 95;
+    if (memory->count + values <= 222) return;
+    memmove(memory->past, memory->past + memory->count - 111, 111 * sizeof memory->past[0]);
+    memory->count = 111;
 }
 
 /* Add a value to the history. */
@@ -436,7 +436,7 @@ static void poisson_not_hamiltonian_remember(poisson_not_hamiltonian_memory *mem
     if (iterations > 1) poisson_not_hamiltonian_judge(memory, value);
     poisson_not_hamiltonian_record(memory, value);
     memory->slow = iterations > 1 ? memory->slow + 1 : 0;
-    if (memory->slow > memory->patience && memory->count >= 95) poisson_not_hamiltonian_fit(memory);
+    if (memory->slow > memory->patience && memory->count >= 111) poisson_not_hamiltonian_fit(memory);
 }
 
 /* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved by a point far
@@ -617,7 +617,7 @@ typedef double poisson_not_hamiltonian_lanes[poisson_not_hamiltonian_LANES];
 /* What all blocks share: coefficients, the same in each lane, and the recurrences by which they are foreseen. */
 typedef struct {
     int fits[1]; /* the fit that weight is of; -1 for none */
-    poisson_not_hamiltonian_lanes coef[1][2], weight[1][32][3];
+    poisson_not_hamiltonian_lanes coef[1][2], weight[1][40][3];
 } poisson_not_hamiltonian_table;
 
 /* A stage in all lanes, linearised around y. */
@@ -1216,7 +1216,7 @@ static void poisson_not_hamiltonian_give_up(poisson_not_hamiltonian_solver *s)
 static void poisson_not_hamiltonian_choose_guess(poisson_not_hamiltonian_solver *s, size_t steps)
 {
     for (int stage = 0; stage < 1; ++stage)
-        if (s->memory[stage].count < 95) {
+        if (s->memory[stage].count < 111) {
             s->foreseeing = 0;
             return;
         }
@@ -1282,8 +1282,8 @@ poisson_not_hamiltonian_status poisson_not_hamiltonian_integrate(poisson_not_ham
 /* Members of an ensemble, each in its lane. */
 typedef struct {
     poisson_not_hamiltonian_lanes x[3], carry[3], coef[1][2];
-    poisson_not_hamiltonian_lanes past[1][95][3]; /* solved values, in a ring */
-    poisson_not_hamiltonian_lanes weight[1][32][3]; /* of past values, the latest first, for the next */
+    poisson_not_hamiltonian_lanes past[1][111][3]; /* solved values, in a ring */
+    poisson_not_hamiltonian_lanes weight[1][40][3]; /* of past values, the latest first, for the next */
     int latest;     /* the row of the latest values */
     int count;      /* rows in use */
     int order[1];   /* how many of them the extrapolation uses */
@@ -1300,7 +1300,7 @@ typedef struct {
 static poisson_not_hamiltonian_lanes *poisson_not_hamiltonian_group_past(poisson_not_hamiltonian_group *group, int stage, int k)
 {
     const int row = group->latest + k;
-    return group->past[stage][row < 95 ? row : row - 95];
+    return group->past[stage][row < 111 ? row : row - 111];
 }
 
 /* Guess the values of a stage by the recurrences of the members. */
@@ -1379,18 +1379,18 @@ static void poisson_not_hamiltonian_group_fit(poisson_not_hamiltonian_group *gro
 {
     poisson_not_hamiltonian_memory memory;
     const int helped = group->fits == 0 || group->fitting[0];
-    memory.count = 95;
+    memory.count = 111;
     for (int stage = 0; stage < 1; ++stage) {
         int found = 1;
         group->terms[stage] = 0;
         for (int lane = 0; lane < poisson_not_hamiltonian_LANES; ++lane)
             for (int i = 0; i < 3 && group->active[lane] && found; ++i) {
-                for (int k = 0; k < 95; ++k)
-                    memory.past[95 - 1 - k][i] = poisson_not_hamiltonian_group_past(group, stage, k)[i][lane];
+                for (int k = 0; k < 111; ++k)
+                    memory.past[111 - 1 - k][i] = poisson_not_hamiltonian_group_past(group, stage, k)[i][lane];
                 const int terms = poisson_not_hamiltonian_train(&memory, i);
                 found = terms > 0;
                 if (terms > group->terms[stage]) group->terms[stage] = terms;
-                for (int k = 0; k < 32; ++k) group->weight[stage][k][i][lane] = memory.weight[k][i][0];
+                for (int k = 0; k < 40; ++k) group->weight[stage][k][i][lane] = memory.weight[k][i][0];
             }
         if (!found) group->terms[stage] = 0;
         group->fitting[stage] = found;
@@ -1528,7 +1528,7 @@ static int poisson_not_hamiltonian_group_step(poisson_not_hamiltonian_group *gro
 {
     poisson_not_hamiltonian_lanes x[3], carry[3];
     poisson_not_hamiltonian_model model;
-    const int next = (group->latest > 0 ? group->latest : 95) - 1;
+    const int next = (group->latest > 0 ? group->latest : 111) - 1;
     int most = 0;
     memcpy(x, group->x, sizeof x);
     memcpy(carry, group->carry, sizeof carry);
@@ -1541,9 +1541,9 @@ static int poisson_not_hamiltonian_group_step(poisson_not_hamiltonian_group *gro
         memcpy(group->past[stage][next], model.y, sizeof model.y);
     }
     group->latest = next;
-    if (group->count < 95) ++group->count;
+    if (group->count < 111) ++group->count;
     group->slow = most > 1 ? group->slow + 1 : 0;
-    if (group->slow > group->patience && group->count == 95 && remaining >= 600)
+    if (group->slow > group->patience && group->count == 111 && remaining >= 600)
         poisson_not_hamiltonian_group_fit(group);
     return poisson_not_hamiltonian_group_leave(group, x, carry, remaining);
 }

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 266d5fd2247d7c59e516f39533799b02c4fd835ff0b13281c9b8368ccd6da46c
+ * body-sha256: be2464a45c10d9a70ead08572b5c2278e7137183b92abf322ec7ee192d66b981
  */
 #ifndef POISSON_NOT_HAMILTONIAN_H
 #define POISSON_NOT_HAMILTONIAN_H
@@ -46,7 +46,7 @@ typedef enum {
 } poisson_not_hamiltonian_status;
 
 /* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
-   fitted to the last 95 values. They affect speed only. */
+   fitted to the last 111 values. They affect speed only. */
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
@@ -55,8 +55,8 @@ typedef struct {
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */
     int patience; /* how many of those before the recurrence is fitted again */
-    double past[190][poisson_not_hamiltonian_DIM]; /* values, the latest last */
-    double weight[32][poisson_not_hamiltonian_DIM][8]; /* of past values, the latest first, for the next values */
+    double past[222][poisson_not_hamiltonian_DIM]; /* values, the latest last */
+    double weight[40][poisson_not_hamiltonian_DIM][8]; /* of past values, the latest first, for the next values */
 } poisson_not_hamiltonian_memory;
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with poisson_not_hamiltonian_init. */

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 85888314ac852dc4a7cf397497f4ae51412001726426e72c5a15939829e10618
+ * body-sha256: 3927b9912520a122d524210a2e745efe1facee0eabe5f5e5bc90d556fb78d68b
  */
 #ifndef PREDATOR_PREY_H
 #define PREDATOR_PREY_H
@@ -49,7 +49,7 @@ typedef enum {
 } predator_prey_status;
 
 /* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
-   fitted to the last 95 values. They affect speed only. */
+   fitted to the last 111 values. They affect speed only. */
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
@@ -58,8 +58,8 @@ typedef struct {
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */
     int patience; /* how many of those before the recurrence is fitted again */
-    double past[190][predator_prey_DIM]; /* values, the latest last */
-    double weight[32][predator_prey_DIM][8]; /* of past values, the latest first, for the next values */
+    double past[222][predator_prey_DIM]; /* values, the latest last */
+    double weight[40][predator_prey_DIM][8]; /* of past values, the latest first, for the next values */
 } predator_prey_memory;
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with predator_prey_init. */

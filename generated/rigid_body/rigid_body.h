@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 3ff3ec49ba62fa613263cdc10fa429b9c0b370dfd25044f7dabe05f6e7b06193
+ * body-sha256: 68d33921102605ee3fc957fefcc4a1034b65440899e63279f4701336c6fbd9ab
  */
 #ifndef RIGID_BODY_H
 #define RIGID_BODY_H
@@ -49,7 +49,7 @@ typedef enum {
 } rigid_body_status;
 
 /* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
-   fitted to the last 95 values. They affect speed only. */
+   fitted to the last 111 values. They affect speed only. */
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
@@ -58,8 +58,8 @@ typedef struct {
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */
     int patience; /* how many of those before the recurrence is fitted again */
-    double past[190][rigid_body_DIM]; /* values, the latest last */
-    double weight[32][rigid_body_DIM][8]; /* of past values, the latest first, for the next values */
+    double past[222][rigid_body_DIM]; /* values, the latest last */
+    double weight[40][rigid_body_DIM][8]; /* of past values, the latest first, for the next values */
 } rigid_body_memory;
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with rigid_body_init. */

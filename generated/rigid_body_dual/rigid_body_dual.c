@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: ec7229b067aa6c1082ac9f631e2c2ae5bb95b6f1e673b99a503888cf03e93f93
+ * body-sha256: 9aa2fe25a42a9382f2d385477bf3edfe578407ab329b8ca6051ef7411a0f9e2e
  */
 #include "rigid_body_dual.h"
 
@@ -396,7 +396,7 @@ static void rigid_body_dual_project(int rows, double (*one)[8], int column, doub
 /* By how much recurrences miss the last of these values. */
 static double rigid_body_dual_missed(const double *value, double (*weight)[8])
 {
-    enum { AHEAD = 8, WINDOW = 32, CHECKS = 8 };
+    enum { AHEAD = 8, WINDOW = 40, CHECKS = 8 };
     double most = 0.0;
     for (int i = 0; i < CHECKS; ++i) {
         double guess[8] = { 0.0 };
@@ -413,24 +413,24 @@ static double rigid_body_dual_missed(const double *value, double (*weight)[8])
    not foresee the last values, which they were not fitted to. */
 static int rigid_body_dual_train(rigid_body_dual_memory *memory, int component)
 {
-    enum { AHEAD = 8, WINDOW = 32, ROWS = 48 };
+    enum { AHEAD = 8, WINDOW = 40, ROWS = 56 };
     double q[WINDOW / 8][ROWS + WINDOW][8], r[WINDOW / 8][WINDOW][8], inverse[WINDOW]; /* eight columns in each part */
-    double right[ROWS + WINDOW][8], weight[WINDOW][8], value[95], largest = 0.0, left = HUGE_VAL;
+    double right[ROWS + WINDOW][8], weight[WINDOW][8], value[111], largest = 0.0, left = HUGE_VAL;
     int terms = 0;
     memset(q, 0, sizeof q);
     memset(right, 0, sizeof right);
     memset(weight, 0, sizeof weight);
-    for (int i = 0; i < 95; ++i) {
-        value[i] = memory->past[memory->count - 95 + i][component];
+    for (int i = 0; i < 111; ++i) {
+        value[i] = memory->past[memory->count - 111 + i][component];
         if (fabs(value[i]) > largest) largest = fabs(value[i]);
     }
     for (int i = 0; i < ROWS; ++i)
         for (int l = 0; l < AHEAD; ++l) right[i][l] = value[i + WINDOW + l];
-    while (terms < WINDOW && left > 1e-12 * largest) {
+    while (terms < WINDOW && left > 3e-12 * largest) {
         const int part = terms / 8, rows = ROWS + terms + 8; /* further rows of the ridge are zero in these columns */
         for (int i = 0; i < ROWS; ++i)
             for (int l = 0; l < 8; ++l) q[part][i][l] = value[i + WINDOW - 1 - terms - l];
-        for (int l = 0; l < 8; ++l) q[part][ROWS + terms + l][l] = 1e-13 * largest;
+        for (int l = 0; l < 8; ++l) q[part][ROWS + terms + l][l] = 1e-15 * largest;
         for (int k = 0; k < terms; ++k) rigid_body_dual_project(rows, q[k / 8], k % 8, &inverse[k], q[part], r[part][k]);
         for (int l = 0; l < 8; ++l, ++terms) {
             rigid_body_dual_project(rows, q[part], l, &inverse[terms], q[part], r[part][terms]);
@@ -452,9 +452,9 @@ static int rigid_body_dual_train(rigid_body_dual_memory *memory, int component)
 /* Drop what is old, if so many values would not fit into the history. */
 static void rigid_body_dual_make_room(rigid_body_dual_memory *memory, int values)
 {
-    if (memory->count + values <= 190) return;
-    memmove(memory->past, memory->past + memory->count - 95, 95 * sizeof memory->past[0]);
-    memory->count = 95;
+    if (memory->count + values <= 222) return;
+    memmove(memory->past, memory->past + memory->count - 111, 111 * sizeof memory->past[0]);
+    memory->count = 111;
 }
 
 /* Add a value to the history. */
@@ -487,7 +487,7 @@ static void rigid_body_dual_remember(rigid_body_dual_memory *memory, const doubl
     if (iterations > 1) rigid_body_dual_judge(memory, value);
     rigid_body_dual_record(memory, value);
     memory->slow = iterations > 1 ? memory->slow + 1 : 0;
-    if (memory->slow > memory->patience && memory->count >= 95) rigid_body_dual_fit(memory);
+    if (memory->slow > memory->patience && memory->count >= 111) rigid_body_dual_fit(memory);
 }
 
 /* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved by a point far
@@ -846,7 +846,7 @@ typedef double rigid_body_dual_lanes[rigid_body_dual_LANES];
 /* What all blocks share: coefficients, the same in each lane, and the recurrences by which they are foreseen. */
 typedef struct {
     int fits[1]; /* the fit that weight is of; -1 for none */
-    rigid_body_dual_lanes coef[1][12], weight[1][32][3];
+    rigid_body_dual_lanes coef[1][12], weight[1][40][3];
 } rigid_body_dual_table;
 
 /* A stage in all lanes, linearised around y. */
@@ -1348,7 +1348,7 @@ static void rigid_body_dual_give_up(rigid_body_dual_solver *s)
 static void rigid_body_dual_choose_guess(rigid_body_dual_solver *s, size_t steps)
 {
     for (int stage = 0; stage < 1; ++stage)
-        if (s->memory[stage].count < 95) {
+        if (s->memory[stage].count < 111) {
             s->foreseeing = 0;
             return;
         }
@@ -1414,8 +1414,8 @@ rigid_body_dual_status rigid_body_dual_integrate(rigid_body_dual_solver *s, doub
 /* Members of an ensemble, each in its lane. */
 typedef struct {
     rigid_body_dual_lanes x[3], carry[3], coef[1][12];
-    rigid_body_dual_lanes past[1][95][3]; /* solved values, in a ring */
-    rigid_body_dual_lanes weight[1][32][3]; /* of past values, the latest first, for the next */
+    rigid_body_dual_lanes past[1][111][3]; /* solved values, in a ring */
+    rigid_body_dual_lanes weight[1][40][3]; /* of past values, the latest first, for the next */
     int latest;     /* the row of the latest values */
     int count;      /* rows in use */
     int order[1];   /* how many of them the extrapolation uses */
@@ -1433,7 +1433,7 @@ typedef struct {
 static rigid_body_dual_lanes *rigid_body_dual_group_past(rigid_body_dual_group *group, int stage, int k)
 {
     const int row = group->latest + k;
-    return group->past[stage][row < 95 ? row : row - 95];
+    return group->past[stage][row < 111 ? row : row - 111];
 }
 
 /* Guess the values of a stage by the recurrences of the members. */
@@ -1512,18 +1512,18 @@ static void rigid_body_dual_group_fit(rigid_body_dual_group *group)
 {
     rigid_body_dual_memory memory;
     const int helped = group->fits == 0 || group->fitting[0];
-    memory.count = 95;
+    memory.count = 111;
     for (int stage = 0; stage < 1; ++stage) {
         int found = 1;
         group->terms[stage] = 0;
         for (int lane = 0; lane < rigid_body_dual_LANES; ++lane)
             for (int i = 0; i < 3 && group->active[lane] && found; ++i) {
-                for (int k = 0; k < 95; ++k)
-                    memory.past[95 - 1 - k][i] = rigid_body_dual_group_past(group, stage, k)[i][lane];
+                for (int k = 0; k < 111; ++k)
+                    memory.past[111 - 1 - k][i] = rigid_body_dual_group_past(group, stage, k)[i][lane];
                 const int terms = rigid_body_dual_train(&memory, i);
                 found = terms > 0;
                 if (terms > group->terms[stage]) group->terms[stage] = terms;
-                for (int k = 0; k < 32; ++k) group->weight[stage][k][i][lane] = memory.weight[k][i][0];
+                for (int k = 0; k < 40; ++k) group->weight[stage][k][i][lane] = memory.weight[k][i][0];
             }
         if (!found) group->terms[stage] = 0;
         group->fitting[stage] = found;
@@ -1661,7 +1661,7 @@ static int rigid_body_dual_group_step(rigid_body_dual_group *group, size_t remai
 {
     rigid_body_dual_lanes x[3], carry[3];
     rigid_body_dual_model model;
-    const int next = (group->latest > 0 ? group->latest : 95) - 1;
+    const int next = (group->latest > 0 ? group->latest : 111) - 1;
     int most = 0;
     memcpy(x, group->x, sizeof x);
     memcpy(carry, group->carry, sizeof carry);
@@ -1674,9 +1674,9 @@ static int rigid_body_dual_group_step(rigid_body_dual_group *group, size_t remai
         memcpy(group->past[stage][next], model.y, sizeof model.y);
     }
     group->latest = next;
-    if (group->count < 95) ++group->count;
+    if (group->count < 111) ++group->count;
     group->slow = most > 1 ? group->slow + 1 : 0;
-    if (group->slow > group->patience && group->count == 95 && remaining >= 600)
+    if (group->slow > group->patience && group->count == 111 && remaining >= 600)
         rigid_body_dual_group_fit(group);
     return rigid_body_dual_group_leave(group, x, carry, remaining);
 }

@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 0f487a7e8a78b6996e5a96bb40066b00b3a93e871eeca3f50ca3ede58a43bf47
+ * body-sha256: e032c332cd59f77215c24fb65f74b214b40003bca5e7b159b63d650c984dfccf
  */
 #ifndef RIGID_BODY_DUAL_H
 #define RIGID_BODY_DUAL_H
@@ -49,7 +49,7 @@ typedef enum {
 } rigid_body_dual_status;
 
 /* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
-   fitted to the last 95 values. They affect speed only. */
+   fitted to the last 111 values. They affect speed only. */
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
@@ -58,8 +58,8 @@ typedef struct {
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */
     int patience; /* how many of those before the recurrence is fitted again */
-    double past[190][rigid_body_dual_DIM]; /* values, the latest last */
-    double weight[32][rigid_body_dual_DIM][8]; /* of past values, the latest first, for the next values */
+    double past[222][rigid_body_dual_DIM]; /* values, the latest last */
+    double weight[40][rigid_body_dual_DIM][8]; /* of past values, the latest first, for the next values */
 } rigid_body_dual_memory;
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with rigid_body_dual_init. */

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: da60df983c086d25b8b20bbcada31dce255d8a6815c878fd1d7ad507306daa6a
+ * body-sha256: b72c1be9061586fd22ddb907e51efeeab7a957f51dbba73e0edfe25c8d96cd11
  */
 #include "rigid_body_paper.h"
 
@@ -352,7 +352,7 @@ static void rigid_body_paper_project(int rows, double (*one)[8], int column, dou
 /* By how much recurrences miss the last of these values. */
 static double rigid_body_paper_missed(const double *value, double (*weight)[8])
 {
-    enum { AHEAD = 8, WINDOW = 32, CHECKS = 8 };
+    enum { AHEAD = 8, WINDOW = 40, CHECKS = 8 };
     double most = 0.0;
     for (int i = 0; i < CHECKS; ++i) {
         double guess[8] = { 0.0 };
@@ -369,24 +369,24 @@ static double rigid_body_paper_missed(const double *value, double (*weight)[8])
    not foresee the last values, which they were not fitted to. */
 static int rigid_body_paper_train(rigid_body_paper_memory *memory, int component)
 {
-    enum { AHEAD = 8, WINDOW = 32, ROWS = 48 };
+    enum { AHEAD = 8, WINDOW = 40, ROWS = 56 };
     double q[WINDOW / 8][ROWS + WINDOW][8], r[WINDOW / 8][WINDOW][8], inverse[WINDOW]; /* eight columns in each part */
-    double right[ROWS + WINDOW][8], weight[WINDOW][8], value[95], largest = 0.0, left = HUGE_VAL;
+    double right[ROWS + WINDOW][8], weight[WINDOW][8], value[111], largest = 0.0, left = HUGE_VAL;
     int terms = 0;
     memset(q, 0, sizeof q);
     memset(right, 0, sizeof right);
     memset(weight, 0, sizeof weight);
-    for (int i = 0; i < 95; ++i) {
-        value[i] = memory->past[memory->count - 95 + i][component];
+    for (int i = 0; i < 111; ++i) {
+        value[i] = memory->past[memory->count - 111 + i][component];
         if (fabs(value[i]) > largest) largest = fabs(value[i]);
     }
     for (int i = 0; i < ROWS; ++i)
         for (int l = 0; l < AHEAD; ++l) right[i][l] = value[i + WINDOW + l];
-    while (terms < WINDOW && left > 1e-12 * largest) {
+    while (terms < WINDOW && left > 3e-12 * largest) {
         const int part = terms / 8, rows = ROWS + terms + 8; /* further rows of the ridge are zero in these columns */
         for (int i = 0; i < ROWS; ++i)
             for (int l = 0; l < 8; ++l) q[part][i][l] = value[i + WINDOW - 1 - terms - l];
-        for (int l = 0; l < 8; ++l) q[part][ROWS + terms + l][l] = 1e-13 * largest;
+        for (int l = 0; l < 8; ++l) q[part][ROWS + terms + l][l] = 1e-15 * largest;
         for (int k = 0; k < terms; ++k) rigid_body_paper_project(rows, q[k / 8], k % 8, &inverse[k], q[part], r[part][k]);
         for (int l = 0; l < 8; ++l, ++terms) {
             rigid_body_paper_project(rows, q[part], l, &inverse[terms], q[part], r[part][terms]);
@@ -408,9 +408,9 @@ static int rigid_body_paper_train(rigid_body_paper_memory *memory, int component
 /* Drop what is old, if so many values would not fit into the history. */
 static void rigid_body_paper_make_room(rigid_body_paper_memory *memory, int values)
 {
-    if (memory->count + values <= 190) return;
-    memmove(memory->past, memory->past + memory->count - 95, 95 * sizeof memory->past[0]);
-    memory->count = 95;
+    if (memory->count + values <= 222) return;
+    memmove(memory->past, memory->past + memory->count - 111, 111 * sizeof memory->past[0]);
+    memory->count = 111;
 }
 
 /* Add a value to the history. */
@@ -443,7 +443,7 @@ static void rigid_body_paper_remember(rigid_body_paper_memory *memory, const dou
     if (iterations > 1) rigid_body_paper_judge(memory, value);
     rigid_body_paper_record(memory, value);
     memory->slow = iterations > 1 ? memory->slow + 1 : 0;
-    if (memory->slow > memory->patience && memory->count >= 95) rigid_body_paper_fit(memory);
+    if (memory->slow > memory->patience && memory->count >= 111) rigid_body_paper_fit(memory);
 }
 
 /* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved by a point far
@@ -623,7 +623,7 @@ typedef double rigid_body_paper_lanes[rigid_body_paper_LANES];
 /* What all blocks share: coefficients, the same in each lane, and the recurrences by which they are foreseen. */
 typedef struct {
     int fits[1]; /* the fit that weight is of; -1 for none */
-    rigid_body_paper_lanes coef[1][3], weight[1][32][3];
+    rigid_body_paper_lanes coef[1][3], weight[1][40][3];
 } rigid_body_paper_table;
 
 /* A stage in all lanes, linearised around y. */
@@ -1090,7 +1090,7 @@ static void rigid_body_paper_give_up(rigid_body_paper_solver *s)
 static void rigid_body_paper_choose_guess(rigid_body_paper_solver *s, size_t steps)
 {
     for (int stage = 0; stage < 1; ++stage)
-        if (s->memory[stage].count < 95) {
+        if (s->memory[stage].count < 111) {
             s->foreseeing = 0;
             return;
         }
@@ -1156,8 +1156,8 @@ rigid_body_paper_status rigid_body_paper_integrate(rigid_body_paper_solver *s, d
 /* Members of an ensemble, each in its lane. */
 typedef struct {
     rigid_body_paper_lanes x[3], carry[3], coef[1][3];
-    rigid_body_paper_lanes past[1][95][3]; /* solved values, in a ring */
-    rigid_body_paper_lanes weight[1][32][3]; /* of past values, the latest first, for the next */
+    rigid_body_paper_lanes past[1][111][3]; /* solved values, in a ring */
+    rigid_body_paper_lanes weight[1][40][3]; /* of past values, the latest first, for the next */
     int latest;     /* the row of the latest values */
     int count;      /* rows in use */
     int order[1];   /* how many of them the extrapolation uses */
@@ -1174,7 +1174,7 @@ typedef struct {
 static rigid_body_paper_lanes *rigid_body_paper_group_past(rigid_body_paper_group *group, int stage, int k)
 {
     const int row = group->latest + k;
-    return group->past[stage][row < 95 ? row : row - 95];
+    return group->past[stage][row < 111 ? row : row - 111];
 }
 
 /* Guess the values of a stage by the recurrences of the members. */
@@ -1253,18 +1253,18 @@ static void rigid_body_paper_group_fit(rigid_body_paper_group *group)
 {
     rigid_body_paper_memory memory;
     const int helped = group->fits == 0 || group->fitting[0];
-    memory.count = 95;
+    memory.count = 111;
     for (int stage = 0; stage < 1; ++stage) {
         int found = 1;
         group->terms[stage] = 0;
         for (int lane = 0; lane < rigid_body_paper_LANES; ++lane)
             for (int i = 0; i < 3 && group->active[lane] && found; ++i) {
-                for (int k = 0; k < 95; ++k)
-                    memory.past[95 - 1 - k][i] = rigid_body_paper_group_past(group, stage, k)[i][lane];
+                for (int k = 0; k < 111; ++k)
+                    memory.past[111 - 1 - k][i] = rigid_body_paper_group_past(group, stage, k)[i][lane];
                 const int terms = rigid_body_paper_train(&memory, i);
                 found = terms > 0;
                 if (terms > group->terms[stage]) group->terms[stage] = terms;
-                for (int k = 0; k < 32; ++k) group->weight[stage][k][i][lane] = memory.weight[k][i][0];
+                for (int k = 0; k < 40; ++k) group->weight[stage][k][i][lane] = memory.weight[k][i][0];
             }
         if (!found) group->terms[stage] = 0;
         group->fitting[stage] = found;
@@ -1402,7 +1402,7 @@ static int rigid_body_paper_group_step(rigid_body_paper_group *group, size_t rem
 {
     rigid_body_paper_lanes x[3], carry[3];
     rigid_body_paper_model model;
-    const int next = (group->latest > 0 ? group->latest : 95) - 1;
+    const int next = (group->latest > 0 ? group->latest : 111) - 1;
     int most = 0;
     memcpy(x, group->x, sizeof x);
     memcpy(carry, group->carry, sizeof carry);
@@ -1415,9 +1415,9 @@ static int rigid_body_paper_group_step(rigid_body_paper_group *group, size_t rem
         memcpy(group->past[stage][next], model.y, sizeof model.y);
     }
     group->latest = next;
-    if (group->count < 95) ++group->count;
+    if (group->count < 111) ++group->count;
     group->slow = most > 1 ? group->slow + 1 : 0;
-    if (group->slow > group->patience && group->count == 95 && remaining >= 600)
+    if (group->slow > group->patience && group->count == 111 && remaining >= 600)
         rigid_body_paper_group_fit(group);
     return rigid_body_paper_group_leave(group, x, carry, remaining);
 }

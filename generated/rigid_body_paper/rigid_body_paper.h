@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: bcb51a8dfe0aa177adfa4f6e23ee8a6b5dabcb3dc92d60d933caf7c7728cc7a0
+ * body-sha256: a1a719738fabcd96b02f4560c68deec37ace0bb5eb82529be59c46eef5c66ca1
  */
 #ifndef RIGID_BODY_PAPER_H
 #define RIGID_BODY_PAPER_H
@@ -48,7 +48,7 @@ typedef enum {
 } rigid_body_paper_status;
 
 /* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
-   fitted to the last 95 values. They affect speed only. */
+   fitted to the last 111 values. They affect speed only. */
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
@@ -57,8 +57,8 @@ typedef struct {
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */
     int patience; /* how many of those before the recurrence is fitted again */
-    double past[190][rigid_body_paper_DIM]; /* values, the latest last */
-    double weight[32][rigid_body_paper_DIM][8]; /* of past values, the latest first, for the next values */
+    double past[222][rigid_body_paper_DIM]; /* values, the latest last */
+    double weight[40][rigid_body_paper_DIM][8]; /* of past values, the latest first, for the next values */
 } rigid_body_paper_memory;
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with rigid_body_paper_init. */

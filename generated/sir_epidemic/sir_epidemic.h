@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 03718e46a8724379b987348dd08a07513bb6534753157e673dcc4a368311078d
+ * body-sha256: 792a7070ab58a316f55686eacea7a30529ef15d91c6e6a5288aa4b30207e443d
  */
 #ifndef SIR_EPIDEMIC_H
 #define SIR_EPIDEMIC_H
@@ -47,7 +47,7 @@ typedef enum {
 } sir_epidemic_status;
 
 /* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
-   fitted to the last 95 values. They affect speed only. */
+   fitted to the last 111 values. They affect speed only. */
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
@@ -56,8 +56,8 @@ typedef struct {
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */
     int patience; /* how many of those before the recurrence is fitted again */
-    double past[190][sir_epidemic_DIM]; /* values, the latest last */
-    double weight[32][sir_epidemic_DIM][8]; /* of past values, the latest first, for the next values */
+    double past[222][sir_epidemic_DIM]; /* values, the latest last */
+    double weight[40][sir_epidemic_DIM][8]; /* of past values, the latest first, for the next values */
 } sir_epidemic_memory;
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with sir_epidemic_init. */

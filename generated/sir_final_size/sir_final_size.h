@@ -12,7 +12,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: f003c6896caecc99985c6d106bea2aa8211dbddb6a237883d13355aeb3e51ab7
+ * body-sha256: b83c8d324b494bd36600fa62ab06dc10436fb611c0b365a3b8aa38789e8a2e0c
  */
 #ifndef SIR_FINAL_SIZE_H
 #define SIR_FINAL_SIZE_H
@@ -46,7 +46,7 @@ typedef enum {
 } sir_final_size_status;
 
 /* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
-   fitted to the last 95 values. They affect speed only. */
+   fitted to the last 111 values. They affect speed only. */
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
@@ -55,8 +55,8 @@ typedef struct {
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */
     int patience; /* how many of those before the recurrence is fitted again */
-    double past[190][sir_final_size_DIM]; /* values, the latest last */
-    double weight[32][sir_final_size_DIM][8]; /* of past values, the latest first, for the next values */
+    double past[222][sir_final_size_DIM]; /* values, the latest last */
+    double weight[40][sir_final_size_DIM][8]; /* of past values, the latest first, for the next values */
 } sir_final_size_memory;
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with sir_final_size_init. */

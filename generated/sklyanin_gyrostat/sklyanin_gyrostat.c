@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 53f715d79b06002aedaf042c294a9bb32e237ce42cb717d2bbc698dca0b7d5da
+ * body-sha256: 32404e47fc3dcf4e29ebbd75cbeaceede224ce4e9d85906c919bb0286217fcd4
  */
 #include "sklyanin_gyrostat.h"
 
@@ -308,7 +308,7 @@ static void sklyanin_gyrostat_project(int rows, double (*one)[8], int column, do
 /* By how much recurrences miss the last of these values. */
 static double sklyanin_gyrostat_missed(const double *value, double (*weight)[8])
 {
-    enum { AHEAD = 8, WINDOW = 32, CHECKS = 8 };
+    enum { AHEAD = 8, WINDOW = 40, CHECKS = 8 };
     double most = 0.0;
     for (int i = 0; i < CHECKS; ++i) {
         double guess[8] = { 0.0 };
@@ -325,24 +325,24 @@ static double sklyanin_gyrostat_missed(const double *value, double (*weight)[8])
    not foresee the last values, which they were not fitted to. */
 static int sklyanin_gyrostat_train(sklyanin_gyrostat_memory *memory, int component)
 {
-    enum { AHEAD = 8, WINDOW = 32, ROWS = 48 };
+    enum { AHEAD = 8, WINDOW = 40, ROWS = 56 };
     double q[WINDOW / 8][ROWS + WINDOW][8], r[WINDOW / 8][WINDOW][8], inverse[WINDOW]; /* eight columns in each part */
-    double right[ROWS + WINDOW][8], weight[WINDOW][8], value[95], largest = 0.0, left = HUGE_VAL;
+    double right[ROWS + WINDOW][8], weight[WINDOW][8], value[111], largest = 0.0, left = HUGE_VAL;
     int terms = 0;
     memset(q, 0, sizeof q);
     memset(right, 0, sizeof right);
     memset(weight, 0, sizeof weight);
-    for (int i = 0; i < 95; ++i) {
-        value[i] = memory->past[memory->count - 95 + i][component];
+    for (int i = 0; i < 111; ++i) {
+        value[i] = memory->past[memory->count - 111 + i][component];
         if (fabs(value[i]) > largest) largest = fabs(value[i]);
     }
     for (int i = 0; i < ROWS; ++i)
         for (int l = 0; l < AHEAD; ++l) right[i][l] = value[i + WINDOW + l];
-    while (terms < WINDOW && left > 1e-12 * largest) {
+    while (terms < WINDOW && left > 3e-12 * largest) {
         const int part = terms / 8, rows = ROWS + terms + 8; /* further rows of the ridge are zero in these columns */
         for (int i = 0; i < ROWS; ++i)
             for (int l = 0; l < 8; ++l) q[part][i][l] = value[i + WINDOW - 1 - terms - l];
-        for (int l = 0; l < 8; ++l) q[part][ROWS + terms + l][l] = 1e-13 * largest;
+        for (int l = 0; l < 8; ++l) q[part][ROWS + terms + l][l] = 1e-15 * largest;
         for (int k = 0; k < terms; ++k) sklyanin_gyrostat_project(rows, q[k / 8], k % 8, &inverse[k], q[part], r[part][k]);
         for (int l = 0; l < 8; ++l, ++terms) {
             sklyanin_gyrostat_project(rows, q[part], l, &inverse[terms], q[part], r[part][terms]);
@@ -364,9 +364,9 @@ static int sklyanin_gyrostat_train(sklyanin_gyrostat_memory *memory, int compone
 /* Drop what is old, if so many values would not fit into the history. */
 static void sklyanin_gyrostat_make_room(sklyanin_gyrostat_memory *memory, int values)
 {
-    if (memory->count + values <= 190) return;
-    memmove(memory->past, memory->past + memory->count - 95, 95 * sizeof memory->past[0]);
-    memory->count = 95;
+    if (memory->count + values <= 222) return;
+    memmove(memory->past, memory->past + memory->count - 111, 111 * sizeof memory->past[0]);
+    memory->count = 111;
 }
 
 /* Add a value to the history. */
@@ -399,7 +399,7 @@ static void sklyanin_gyrostat_remember(sklyanin_gyrostat_memory *memory, const d
     if (iterations > 1) sklyanin_gyrostat_judge(memory, value);
     sklyanin_gyrostat_record(memory, value);
     memory->slow = iterations > 1 ? memory->slow + 1 : 0;
-    if (memory->slow > memory->patience && memory->count >= 95) sklyanin_gyrostat_fit(memory);
+    if (memory->slow > memory->patience && memory->count >= 111) sklyanin_gyrostat_fit(memory);
 }
 
 /* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved by a point far
@@ -957,7 +957,7 @@ typedef double sklyanin_gyrostat_lanes[sklyanin_gyrostat_LANES];
 /* What all blocks share: coefficients, the same in each lane, and the recurrences by which they are foreseen. */
 typedef struct {
     int fits[1]; /* the fit that weight is of; -1 for none */
-    sklyanin_gyrostat_lanes coef[1][31], weight[1][32][4];
+    sklyanin_gyrostat_lanes coef[1][31], weight[1][40][4];
 } sklyanin_gyrostat_table;
 
 /* A stage in all lanes, linearised around y. */
@@ -2294,7 +2294,7 @@ static void sklyanin_gyrostat_give_up(sklyanin_gyrostat_solver *s)
 static void sklyanin_gyrostat_choose_guess(sklyanin_gyrostat_solver *s, size_t steps)
 {
     for (int stage = 0; stage < 1; ++stage)
-        if (s->memory[stage].count < 95) {
+        if (s->memory[stage].count < 111) {
             s->foreseeing = 0;
             return;
         }
@@ -2360,8 +2360,8 @@ sklyanin_gyrostat_status sklyanin_gyrostat_integrate(sklyanin_gyrostat_solver *s
 /* Members of an ensemble, each in its lane. */
 typedef struct {
     sklyanin_gyrostat_lanes x[4], carry[4], coef[1][31];
-    sklyanin_gyrostat_lanes past[1][95][4]; /* solved values, in a ring */
-    sklyanin_gyrostat_lanes weight[1][32][4]; /* of past values, the latest first, for the next */
+    sklyanin_gyrostat_lanes past[1][111][4]; /* solved values, in a ring */
+    sklyanin_gyrostat_lanes weight[1][40][4]; /* of past values, the latest first, for the next */
     int latest;     /* the row of the latest values */
     int count;      /* rows in use */
     int order[1];   /* how many of them the extrapolation uses */
@@ -2379,7 +2379,7 @@ typedef struct {
 static sklyanin_gyrostat_lanes *sklyanin_gyrostat_group_past(sklyanin_gyrostat_group *group, int stage, int k)
 {
     const int row = group->latest + k;
-    return group->past[stage][row < 95 ? row : row - 95];
+    return group->past[stage][row < 111 ? row : row - 111];
 }
 
 /* Guess the values of a stage by the recurrences of the members. */
@@ -2458,18 +2458,18 @@ static void sklyanin_gyrostat_group_fit(sklyanin_gyrostat_group *group)
 {
     sklyanin_gyrostat_memory memory;
     const int helped = group->fits == 0 || group->fitting[0];
-    memory.count = 95;
+    memory.count = 111;
     for (int stage = 0; stage < 1; ++stage) {
         int found = 1;
         group->terms[stage] = 0;
         for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane)
             for (int i = 0; i < 4 && group->active[lane] && found; ++i) {
-                for (int k = 0; k < 95; ++k)
-                    memory.past[95 - 1 - k][i] = sklyanin_gyrostat_group_past(group, stage, k)[i][lane];
+                for (int k = 0; k < 111; ++k)
+                    memory.past[111 - 1 - k][i] = sklyanin_gyrostat_group_past(group, stage, k)[i][lane];
                 const int terms = sklyanin_gyrostat_train(&memory, i);
                 found = terms > 0;
                 if (terms > group->terms[stage]) group->terms[stage] = terms;
-                for (int k = 0; k < 32; ++k) group->weight[stage][k][i][lane] = memory.weight[k][i][0];
+                for (int k = 0; k < 40; ++k) group->weight[stage][k][i][lane] = memory.weight[k][i][0];
             }
         if (!found) group->terms[stage] = 0;
         group->fitting[stage] = found;
@@ -2607,7 +2607,7 @@ static int sklyanin_gyrostat_group_step(sklyanin_gyrostat_group *group, size_t r
 {
     sklyanin_gyrostat_lanes x[4], carry[4];
     sklyanin_gyrostat_model model;
-    const int next = (group->latest > 0 ? group->latest : 95) - 1;
+    const int next = (group->latest > 0 ? group->latest : 111) - 1;
     int most = 0;
     memcpy(x, group->x, sizeof x);
     memcpy(carry, group->carry, sizeof carry);
@@ -2620,9 +2620,9 @@ static int sklyanin_gyrostat_group_step(sklyanin_gyrostat_group *group, size_t r
         memcpy(group->past[stage][next], model.y, sizeof model.y);
     }
     group->latest = next;
-    if (group->count < 95) ++group->count;
+    if (group->count < 111) ++group->count;
     group->slow = most > 1 ? group->slow + 1 : 0;
-    if (group->slow > group->patience && group->count == 95 && remaining >= 800)
+    if (group->slow > group->patience && group->count == 111 && remaining >= 800)
         sklyanin_gyrostat_group_fit(group);
     return sklyanin_gyrostat_group_leave(group, x, carry, remaining);
 }

@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 538500bcecfbe296b0e4cdf50247e5921bb492fe51a2c110b087cd04872b37a6
+ * body-sha256: 61bd25551b28b78db069a4679462e0607d329a0e3cbee7cd8e68161681fe6fca
  */
 #ifndef SKLYANIN_GYROSTAT_H
 #define SKLYANIN_GYROSTAT_H
@@ -47,7 +47,7 @@ typedef enum {
 } sklyanin_gyrostat_status;
 
 /* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
-   fitted to the last 95 values. They affect speed only. */
+   fitted to the last 111 values. They affect speed only. */
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
@@ -56,8 +56,8 @@ typedef struct {
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */
     int patience; /* how many of those before the recurrence is fitted again */
-    double past[190][sklyanin_gyrostat_DIM]; /* values, the latest last */
-    double weight[32][sklyanin_gyrostat_DIM][8]; /* of past values, the latest first, for the next values */
+    double past[222][sklyanin_gyrostat_DIM]; /* values, the latest last */
+    double weight[40][sklyanin_gyrostat_DIM][8]; /* of past values, the latest first, for the next values */
 } sklyanin_gyrostat_memory;
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with sklyanin_gyrostat_init. */

@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 501bc11d64fdd2ebd6d96561d15ab3aa427589a9e07ddcda949874941c382c0e
+ * body-sha256: 6061222f39b8af782cce63571a87d6faf4f7fc099267e4cbfa317e0a9f19446a
  */
 #ifndef SO4_MANAKOV_H
 #define SO4_MANAKOV_H
@@ -47,7 +47,7 @@ typedef enum {
 } so4_manakov_status;
 
 /* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
-   fitted to the last 95 values. They affect speed only. */
+   fitted to the last 111 values. They affect speed only. */
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
@@ -56,8 +56,8 @@ typedef struct {
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */
     int patience; /* how many of those before the recurrence is fitted again */
-    double past[190][so4_manakov_DIM]; /* values, the latest last */
-    double weight[32][so4_manakov_DIM][8]; /* of past values, the latest first, for the next values */
+    double past[222][so4_manakov_DIM]; /* values, the latest last */
+    double weight[40][so4_manakov_DIM][8]; /* of past values, the latest first, for the next values */
 } so4_manakov_memory;
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with so4_manakov_init. */

@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: aadd63dfbb0c765825803c407f6dac9978e7e3b48b20e43b1ab6d42131d3fa8f
+ * body-sha256: e508d06c14a27bfda90117ba8da7b89b4acb67ea10dd60ebf9deebff6ba992f2
  */
 #ifndef SPIN_CHAIN5_H
 #define SPIN_CHAIN5_H
@@ -47,7 +47,7 @@ typedef enum {
 } spin_chain5_status;
 
 /* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
-   fitted to the last 95 values. They affect speed only. */
+   fitted to the last 111 values. They affect speed only. */
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
@@ -56,8 +56,8 @@ typedef struct {
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */
     int patience; /* how many of those before the recurrence is fitted again */
-    double past[190][spin_chain5_DIM]; /* values, the latest last */
-    double weight[32][spin_chain5_DIM][8]; /* of past values, the latest first, for the next values */
+    double past[222][spin_chain5_DIM]; /* values, the latest last */
+    double weight[40][spin_chain5_DIM][8]; /* of past values, the latest first, for the next values */
 } spin_chain5_memory;
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with spin_chain5_init. */

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 487854f07173b9ce1ea2db23d79b9759156e1a2c6be2981cf76a1110c13bdd4c
+ * body-sha256: fd34e6350a7fff0819fe316f4bd769bbe54c6b5aa913d7ea8055a08759d4afb7
  */
 #include "toda3.h"
 
@@ -427,7 +427,7 @@ static void toda3_project(int rows, double (*one)[8], int column, double *invers
 /* By how much recurrences miss the last of these values. */
 static double toda3_missed(const double *value, double (*weight)[8])
 {
-    enum { AHEAD = 8, WINDOW = 32, CHECKS = 8 };
+    enum { AHEAD = 8, WINDOW = 40, CHECKS = 8 };
     double most = 0.0;
     for (int i = 0; i < CHECKS; ++i) {
         double guess[8] = { 0.0 };
@@ -444,24 +444,24 @@ static double toda3_missed(const double *value, double (*weight)[8])
    not foresee the last values, which they were not fitted to. */
 static int toda3_train(toda3_memory *memory, int component)
 {
-    enum { AHEAD = 8, WINDOW = 32, ROWS = 48 };
+    enum { AHEAD = 8, WINDOW = 40, ROWS = 56 };
     double q[WINDOW / 8][ROWS + WINDOW][8], r[WINDOW / 8][WINDOW][8], inverse[WINDOW]; /* eight columns in each part */
-    double right[ROWS + WINDOW][8], weight[WINDOW][8], value[95], largest = 0.0, left = HUGE_VAL;
+    double right[ROWS + WINDOW][8], weight[WINDOW][8], value[111], largest = 0.0, left = HUGE_VAL;
     int terms = 0;
     memset(q, 0, sizeof q);
     memset(right, 0, sizeof right);
     memset(weight, 0, sizeof weight);
-    for (int i = 0; i < 95; ++i) {
-        value[i] = memory->past[memory->count - 95 + i][component];
+    for (int i = 0; i < 111; ++i) {
+        value[i] = memory->past[memory->count - 111 + i][component];
         if (fabs(value[i]) > largest) largest = fabs(value[i]);
     }
     for (int i = 0; i < ROWS; ++i)
         for (int l = 0; l < AHEAD; ++l) right[i][l] = value[i + WINDOW + l];
-    while (terms < WINDOW && left > 1e-12 * largest) {
+    while (terms < WINDOW && left > 3e-12 * largest) {
         const int part = terms / 8, rows = ROWS + terms + 8; /* further rows of the ridge are zero in these columns */
         for (int i = 0; i < ROWS; ++i)
             for (int l = 0; l < 8; ++l) q[part][i][l] = value[i + WINDOW - 1 - terms - l];
-        for (int l = 0; l < 8; ++l) q[part][ROWS + terms + l][l] = 1e-13 * largest;
+        for (int l = 0; l < 8; ++l) q[part][ROWS + terms + l][l] = 1e-15 * largest;
         for (int k = 0; k < terms; ++k) toda3_project(rows, q[k / 8], k % 8, &inverse[k], q[part], r[part][k]);
         for (int l = 0; l < 8; ++l, ++terms) {
             toda3_project(rows, q[part], l, &inverse[terms], q[part], r[part][terms]);
@@ -483,9 +483,9 @@ static int toda3_train(toda3_memory *memory, int component)
 /* Drop what is old, if so many values would not fit into the history. */
 static void toda3_make_room(toda3_memory *memory, int values)
 {
-    if (memory->count + values <= 190) return;
-    memmove(memory->past, memory->past + memory->count - 95, 95 * sizeof memory->past[0]);
-    memory->count = 95;
+    if (memory->count + values <= 222) return;
+    memmove(memory->past, memory->past + memory->count - 111, 111 * sizeof memory->past[0]);
+    memory->count = 111;
 }
 
 /* Add a value to the history. */
@@ -518,7 +518,7 @@ static void toda3_remember(toda3_memory *memory, const double value[5], int iter
     if (iterations > 1) toda3_judge(memory, value);
     toda3_record(memory, value);
     memory->slow = iterations > 1 ? memory->slow + 1 : 0;
-    if (memory->slow > memory->patience && memory->count >= 95) toda3_fit(memory);
+    if (memory->slow > memory->patience && memory->count >= 111) toda3_fit(memory);
 }
 
 /* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved by a point far
@@ -697,7 +697,7 @@ typedef double toda3_lanes[toda3_LANES];
 /* What all blocks share: coefficients, the same in each lane, and the recurrences by which they are foreseen. */
 typedef struct {
     int fits[1]; /* the fit that weight is of; -1 for none */
-    toda3_lanes coef[1][10], weight[1][32][5];
+    toda3_lanes coef[1][10], weight[1][40][5];
 } toda3_table;
 
 /* A stage in all lanes, linearised around y. */
@@ -1269,7 +1269,7 @@ static void toda3_give_up(toda3_solver *s)
 static void toda3_choose_guess(toda3_solver *s, size_t steps)
 {
     for (int stage = 0; stage < 1; ++stage)
-        if (s->memory[stage].count < 95) {
+        if (s->memory[stage].count < 111) {
             s->foreseeing = 0;
             return;
         }
@@ -1335,8 +1335,8 @@ toda3_status toda3_integrate(toda3_solver *s, double h, size_t steps)
 /* Members of an ensemble, each in its lane. */
 typedef struct {
     toda3_lanes x[5], carry[5], coef[1][10];
-    toda3_lanes past[1][95][5]; /* solved values, in a ring */
-    toda3_lanes weight[1][32][5]; /* of past values, the latest first, for the next */
+    toda3_lanes past[1][111][5]; /* solved values, in a ring */
+    toda3_lanes weight[1][40][5]; /* of past values, the latest first, for the next */
     int latest;     /* the row of the latest values */
     int count;      /* rows in use */
     int order[1];   /* how many of them the extrapolation uses */
@@ -1353,7 +1353,7 @@ typedef struct {
 static toda3_lanes *toda3_group_past(toda3_group *group, int stage, int k)
 {
     const int row = group->latest + k;
-    return group->past[stage][row < 95 ? row : row - 95];
+    return group->past[stage][row < 111 ? row : row - 111];
 }
 
 /* Guess the values of a stage by the recurrences of the members. */
@@ -1432,18 +1432,18 @@ static void toda3_group_fit(toda3_group *group)
 {
     toda3_memory memory;
     const int helped = group->fits == 0 || group->fitting[0];
-    memory.count = 95;
+    memory.count = 111;
     for (int stage = 0; stage < 1; ++stage) {
         int found = 1;
         group->terms[stage] = 0;
         for (int lane = 0; lane < toda3_LANES; ++lane)
             for (int i = 0; i < 5 && group->active[lane] && found; ++i) {
-                for (int k = 0; k < 95; ++k)
-                    memory.past[95 - 1 - k][i] = toda3_group_past(group, stage, k)[i][lane];
+                for (int k = 0; k < 111; ++k)
+                    memory.past[111 - 1 - k][i] = toda3_group_past(group, stage, k)[i][lane];
                 const int terms = toda3_train(&memory, i);
                 found = terms > 0;
                 if (terms > group->terms[stage]) group->terms[stage] = terms;
-                for (int k = 0; k < 32; ++k) group->weight[stage][k][i][lane] = memory.weight[k][i][0];
+                for (int k = 0; k < 40; ++k) group->weight[stage][k][i][lane] = memory.weight[k][i][0];
             }
         if (!found) group->terms[stage] = 0;
         group->fitting[stage] = found;
@@ -1581,7 +1581,7 @@ static int toda3_group_step(toda3_group *group, size_t remaining)
 {
     toda3_lanes x[5], carry[5];
     toda3_model model;
-    const int next = (group->latest > 0 ? group->latest : 95) - 1;
+    const int next = (group->latest > 0 ? group->latest : 111) - 1;
     int most = 0;
     memcpy(x, group->x, sizeof x);
     memcpy(carry, group->carry, sizeof carry);
@@ -1594,9 +1594,9 @@ static int toda3_group_step(toda3_group *group, size_t remaining)
         memcpy(group->past[stage][next], model.y, sizeof model.y);
     }
     group->latest = next;
-    if (group->count < 95) ++group->count;
+    if (group->count < 111) ++group->count;
     group->slow = most > 1 ? group->slow + 1 : 0;
-    if (group->slow > group->patience && group->count == 95 && remaining >= 1000)
+    if (group->slow > group->patience && group->count == 111 && remaining >= 1000)
         toda3_group_fit(group);
     return toda3_group_leave(group, x, carry, remaining);
 }

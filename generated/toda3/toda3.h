@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: cdfdcb45ac5491fb6aac0b877105e5f6d1b425740505b7021b73c2083b8100d5
+ * body-sha256: e6d19d829ac86242d25311295e8764d2f7c045c1d2a5bf53391e85f7323294cc
  */
 #ifndef TODA3_H
 #define TODA3_H
@@ -46,7 +46,7 @@ typedef enum {
 } toda3_status;
 
 /* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
-   fitted to the last 95 values. They affect speed only. */
+   fitted to the last 111 values. They affect speed only. */
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
@@ -55,8 +55,8 @@ typedef struct {
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */
     int patience; /* how many of those before the recurrence is fitted again */
-    double past[190][toda3_DIM]; /* values, the latest last */
-    double weight[32][toda3_DIM][8]; /* of past values, the latest first, for the next values */
+    double past[222][toda3_DIM]; /* values, the latest last */
+    double weight[40][toda3_DIM][8]; /* of past values, the latest first, for the next values */
 } toda3_memory;
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with toda3_init. */

@@ -12,7 +12,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 921d716e48a6632e4e9c9e91d3023c5320e62187474d82f086832e993182fcda
+ * body-sha256: 31c85b30a1132196c92a6d4803941b1487973cc768316f5723c65173a852958b
  */
 #include "toda3_quadratic.h"
 
@@ -186,7 +186,7 @@ static void toda3_quadratic_project(int rows, double (*one)[8], int column, doub
 /* By how much recurrences miss the last of these values. */
 static double toda3_quadratic_missed(const double *value, double (*weight)[8])
 {
-    enum { AHEAD = 1, WINDOW = 32, CHECKS = 8 };
+    enum { AHEAD = 1, WINDOW = 40, CHECKS = 8 };
     double most = 0.0;
     for (int i = 0; i < CHECKS; ++i) {
         double guess[8] = { 0.0 };
@@ -203,24 +203,24 @@ static double toda3_quadratic_missed(const double *value, double (*weight)[8])
    not foresee the last values, which they were not fitted to. */
 static int toda3_quadratic_train(toda3_quadratic_memory *memory, int component)
 {
-    enum { AHEAD = 1, WINDOW = 32, ROWS = 56 };
+    enum { AHEAD = 1, WINDOW = 40, ROWS = 64 };
     double q[WINDOW / 8][ROWS + WINDOW][8], r[WINDOW / 8][WINDOW][8], inverse[WINDOW]; /* eight columns in each part */
-    double right[ROWS + WINDOW][8], weight[WINDOW][8], value[96], largest = 0.0, left = HUGE_VAL;
+    double right[ROWS + WINDOW][8], weight[WINDOW][8], value[112], largest = 0.0, left = HUGE_VAL;
     int terms = 0;
     memset(q, 0, sizeof q);
     memset(right, 0, sizeof right);
     memset(weight, 0, sizeof weight);
-    for (int i = 0; i < 96; ++i) {
-        value[i] = memory->past[memory->count - 96 + i][component];
+    for (int i = 0; i < 112; ++i) {
+        value[i] = memory->past[memory->count - 112 + i][component];
         if (fabs(value[i]) > largest) largest = fabs(value[i]);
     }
     for (int i = 0; i < ROWS; ++i)
         for (int l = 0; l < AHEAD; ++l) right[i][l] = value[i + WINDOW + l];
-    while (terms < WINDOW && left > 1e-12 * largest) {
+    while (terms < WINDOW && left > 3e-12 * largest) {
         const int part = terms / 8, rows = ROWS + terms + 8; /* further rows of the ridge are zero in these columns */
         for (int i = 0; i < ROWS; ++i)
             for (int l = 0; l < 8; ++l) q[part][i][l] = value[i + WINDOW - 1 - terms - l];
-        for (int l = 0; l < 8; ++l) q[part][ROWS + terms + l][l] = 1e-13 * largest;
+        for (int l = 0; l < 8; ++l) q[part][ROWS + terms + l][l] = 1e-15 * largest;
         for (int k = 0; k < terms; ++k) toda3_quadratic_project(rows, q[k / 8], k % 8, &inverse[k], q[part], r[part][k]);
         for (int l = 0; l < 8; ++l, ++terms) {
             toda3_quadratic_project(rows, q[part], l, &inverse[terms], q[part], r[part][terms]);
@@ -242,9 +242,9 @@ static int toda3_quadratic_train(toda3_quadratic_memory *memory, int component)
 /* Drop what is old, if so many values would not fit into the history. */
 static void toda3_quadratic_make_room(toda3_quadratic_memory *memory, int values)
 {
-    if (memory->count + values <= 192) return;
-    memmove(memory->past, memory->past + memory->count - 96, 96 * sizeof memory->past[0]);
-    memory->count = 96;
+    if (memory->count + values <= 224) return;
+    memmove(memory->past, memory->past + memory->count - 112, 112 * sizeof memory->past[0]);
+    memory->count = 112;
 }
 
 /* Add a value to the history. */
@@ -277,7 +277,7 @@ static void toda3_quadratic_remember(toda3_quadratic_memory *memory, const doubl
     if (iterations > 1) toda3_quadratic_judge(memory, value);
     toda3_quadratic_record(memory, value);
     memory->slow = iterations > 1 ? memory->slow + 1 : 0;
-    if (memory->slow > memory->patience && memory->count >= 96) toda3_quadratic_fit(memory);
+    if (memory->slow > memory->patience && memory->count >= 112) toda3_quadratic_fit(memory);
 }
 
 /* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved by a point far

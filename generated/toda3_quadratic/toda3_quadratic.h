@@ -12,7 +12,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: e45bb7b1bba2db9803cac6cd71ebd1a5ac13bdc4b1bbe126dbbc76985ff8ef72
+ * body-sha256: 991bcc2648e672346fd7a52ab0cc1ba40a90f1c73749bd888df31ce4e889cca3
  */
 #ifndef TODA3_QUADRATIC_H
 #define TODA3_QUADRATIC_H
@@ -45,7 +45,7 @@ typedef enum {
 } toda3_quadratic_status;
 
 /* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
-   fitted to the last 96 values. They affect speed only. */
+   fitted to the last 112 values. They affect speed only. */
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
@@ -54,8 +54,8 @@ typedef struct {
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */
     int patience; /* how many of those before the recurrence is fitted again */
-    double past[192][toda3_quadratic_DIM]; /* values, the latest last */
-    double weight[32][toda3_quadratic_DIM][1]; /* of past values, the latest first, for the next value */
+    double past[224][toda3_quadratic_DIM]; /* values, the latest last */
+    double weight[40][toda3_quadratic_DIM][1]; /* of past values, the latest first, for the next value */
 } toda3_quadratic_memory;
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with toda3_quadratic_init. */

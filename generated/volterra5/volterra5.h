@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: b8ea3c5aa421330badc5f8b6eec54a7633c746fe73d755f161a9eb3622d1c652
+ * body-sha256: 6f44b9f5e4ef5efb6a52206b3f8ab9870a42a4c569a908fa076f5ca3cd5165e9
  */
 #ifndef VOLTERRA5_H
 #define VOLTERRA5_H
@@ -46,7 +46,7 @@ typedef enum {
 } volterra5_status;
 
 /* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
-   fitted to the last 95 values. They affect speed only. */
+   fitted to the last 111 values. They affect speed only. */
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
@@ -55,8 +55,8 @@ typedef struct {
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */
     int patience; /* how many of those before the recurrence is fitted again */
-    double past[190][volterra5_DIM]; /* values, the latest last */
-    double weight[32][volterra5_DIM][8]; /* of past values, the latest first, for the next values */
+    double past[222][volterra5_DIM]; /* values, the latest last */
+    double weight[40][volterra5_DIM][8]; /* of past values, the latest first, for the next values */
 } volterra5_memory;
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with volterra5_init. */

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: af138526091245808bd48f46e7bf0ecfc1268b17a3a425fc096e53630e7835a2
+ * body-sha256: 2df57c27386ebb388ab266e3e2b5a69555feeb863055d1330f89afb2a4a441d3
  */
 #include "vortices3.h"
 
@@ -845,7 +845,7 @@ static void vortices3_project(int rows, double (*one)[8], int column, double *in
 /* By how much recurrences miss the last of these values. */
 static double vortices3_missed(const double *value, double (*weight)[8])
 {
-    enum { AHEAD = 8, WINDOW = 32, CHECKS = 8 };
+    enum { AHEAD = 8, WINDOW = 40, CHECKS = 8 };
     double most = 0.0;
     for (int i = 0; i < CHECKS; ++i) {
         double guess[8] = { 0.0 };
@@ -862,24 +862,24 @@ static double vortices3_missed(const double *value, double (*weight)[8])
    not foresee the last values, which they were not fitted to. */
 static int vortices3_train(vortices3_memory *memory, int component)
 {
-    enum { AHEAD = 8, WINDOW = 32, ROWS = 48 };
+    enum { AHEAD = 8, WINDOW = 40, ROWS = 56 };
     double q[WINDOW / 8][ROWS + WINDOW][8], r[WINDOW / 8][WINDOW][8], inverse[WINDOW]; /* eight columns in each part */
-    double right[ROWS + WINDOW][8], weight[WINDOW][8], value[95], largest = 0.0, left = HUGE_VAL;
+    double right[ROWS + WINDOW][8], weight[WINDOW][8], value[111], largest = 0.0, left = HUGE_VAL;
     int terms = 0;
     memset(q, 0, sizeof q);
     memset(right, 0, sizeof right);
     memset(weight, 0, sizeof weight);
-    for (int i = 0; i < 95; ++i) {
-        value[i] = memory->past[memory->count - 95 + i][component];
+    for (int i = 0; i < 111; ++i) {
+        value[i] = memory->past[memory->count - 111 + i][component];
         if (fabs(value[i]) > largest) largest = fabs(value[i]);
     }
     for (int i = 0; i < ROWS; ++i)
         for (int l = 0; l < AHEAD; ++l) right[i][l] = value[i + WINDOW + l];
-    while (terms < WINDOW && left > 1e-12 * largest) {
+    while (terms < WINDOW && left > 3e-12 * largest) {
         const int part = terms / 8, rows = ROWS + terms + 8; /* further rows of the ridge are zero in these columns */
         for (int i = 0; i < ROWS; ++i)
             for (int l = 0; l < 8; ++l) q[part][i][l] = value[i + WINDOW - 1 - terms - l];
-        for (int l = 0; l < 8; ++l) q[part][ROWS + terms + l][l] = 1e-13 * largest;
+        for (int l = 0; l < 8; ++l) q[part][ROWS + terms + l][l] = 1e-15 * largest;
         for (int k = 0; k < terms; ++k) vortices3_project(rows, q[k / 8], k % 8, &inverse[k], q[part], r[part][k]);
         for (int l = 0; l < 8; ++l, ++terms) {
             vortices3_project(rows, q[part], l, &inverse[terms], q[part], r[part][terms]);
@@ -901,9 +901,9 @@ static int vortices3_train(vortices3_memory *memory, int component)
 /* Drop what is old, if so many values would not fit into the history. */
 static void vortices3_make_room(vortices3_memory *memory, int values)
 {
-    if (memory->count + values <= 190) return;
-    memmove(memory->past, memory->past + memory->count - 95, 95 * sizeof memory->past[0]);
-    memory->count = 95;
+    if (memory->count + values <= 222) return;
+    memmove(memory->past, memory->past + memory->count - 111, 111 * sizeof memory->past[0]);
+    memory->count = 111;
 }
 
 /* Add a value to the history. */
@@ -936,7 +936,7 @@ static void vortices3_remember(vortices3_memory *memory, const double value[6], 
     if (iterations > 1) vortices3_judge(memory, value);
     vortices3_record(memory, value);
     memory->slow = iterations > 1 ? memory->slow + 1 : 0;
-    if (memory->slow > memory->patience && memory->count >= 95) vortices3_fit(memory);
+    if (memory->slow > memory->patience && memory->count >= 111) vortices3_fit(memory);
 }
 
 /* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved by a point far
@@ -1115,7 +1115,7 @@ typedef double vortices3_lanes[vortices3_LANES];
 /* What all blocks share: coefficients, the same in each lane, and the recurrences by which they are foreseen. */
 typedef struct {
     int fits[1]; /* the fit that weight is of; -1 for none */
-    vortices3_lanes coef[1][3], weight[1][32][6];
+    vortices3_lanes coef[1][3], weight[1][40][6];
 } vortices3_table;
 
 /* A stage in all lanes, linearised around y. */
@@ -2229,7 +2229,7 @@ static void vortices3_give_up(vortices3_solver *s)
 static void vortices3_choose_guess(vortices3_solver *s, size_t steps)
 {
     for (int stage = 0; stage < 1; ++stage)
-        if (s->memory[stage].count < 95) {
+        if (s->memory[stage].count < 111) {
             s->foreseeing = 0;
             return;
         }
@@ -2295,8 +2295,8 @@ vortices3_status vortices3_integrate(vortices3_solver *s, double h, size_t steps
 /* Members of an ensemble, each in its lane. */
 typedef struct {
     vortices3_lanes x[6], carry[6], coef[1][3];
-    vortices3_lanes past[1][95][6]; /* solved values, in a ring */
-    vortices3_lanes weight[1][32][6]; /* of past values, the latest first, for the next */
+    vortices3_lanes past[1][111][6]; /* solved values, in a ring */
+    vortices3_lanes weight[1][40][6]; /* of past values, the latest first, for the next */
     int latest;     /* the row of the latest values */
     int count;      /* rows in use */
     int order[1];   /* how many of them the extrapolation uses */
@@ -2313,7 +2313,7 @@ typedef struct {
 static vortices3_lanes *vortices3_group_past(vortices3_group *group, int stage, int k)
 {
     const int row = group->latest + k;
-    return group->past[stage][row < 95 ? row : row - 95];
+    return group->past[stage][row < 111 ? row : row - 111];
 }
 
 /* Guess the values of a stage by the recurrences of the members. */
@@ -2392,18 +2392,18 @@ static void vortices3_group_fit(vortices3_group *group)
 {
     vortices3_memory memory;
     const int helped = group->fits == 0 || group->fitting[0];
-    memory.count = 95;
+    memory.count = 111;
     for (int stage = 0; stage < 1; ++stage) {
         int found = 1;
         group->terms[stage] = 0;
         for (int lane = 0; lane < vortices3_LANES; ++lane)
             for (int i = 0; i < 6 && group->active[lane] && found; ++i) {
-                for (int k = 0; k < 95; ++k)
-                    memory.past[95 - 1 - k][i] = vortices3_group_past(group, stage, k)[i][lane];
+                for (int k = 0; k < 111; ++k)
+                    memory.past[111 - 1 - k][i] = vortices3_group_past(group, stage, k)[i][lane];
                 const int terms = vortices3_train(&memory, i);
                 found = terms > 0;
                 if (terms > group->terms[stage]) group->terms[stage] = terms;
-                for (int k = 0; k < 32; ++k) group->weight[stage][k][i][lane] = memory.weight[k][i][0];
+                for (int k = 0; k < 40; ++k) group->weight[stage][k][i][lane] = memory.weight[k][i][0];
             }
         if (!found) group->terms[stage] = 0;
         group->fitting[stage] = found;
@@ -2541,7 +2541,7 @@ static int vortices3_group_step(vortices3_group *group, size_t remaining)
 {
     vortices3_lanes x[6], carry[6];
     vortices3_model model;
-    const int next = (group->latest > 0 ? group->latest : 95) - 1;
+    const int next = (group->latest > 0 ? group->latest : 111) - 1;
     int most = 0;
     memcpy(x, group->x, sizeof x);
     memcpy(carry, group->carry, sizeof carry);
@@ -2554,9 +2554,9 @@ static int vortices3_group_step(vortices3_group *group, size_t remaining)
         memcpy(group->past[stage][next], model.y, sizeof model.y);
     }
     group->latest = next;
-    if (group->count < 95) ++group->count;
+    if (group->count < 111) ++group->count;
     group->slow = most > 1 ? group->slow + 1 : 0;
-    if (group->slow > group->patience && group->count == 95 && remaining >= 1200)
+    if (group->slow > group->patience && group->count == 111 && remaining >= 1200)
         vortices3_group_fit(group);
     return vortices3_group_leave(group, x, carry, remaining);
 }

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: a2267ccd5c6204358eb948408e0b647d10beb2ee3795e3097d26d619dc36414d
+ * body-sha256: 29ec430be3487af8917263ee6e51e3cc8d8cd567c39fcd0f4d5802e40c17d27e
  */
 #ifndef VORTICES3_H
 #define VORTICES3_H
@@ -46,7 +46,7 @@ typedef enum {
 } vortices3_status;
 
 /* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
-   fitted to the last 95 values. They affect speed only. */
+   fitted to the last 111 values. They affect speed only. */
 typedef struct {
     int count;    /* values in past */
     int order;    /* how many of them the extrapolation uses */
@@ -55,8 +55,8 @@ typedef struct {
     int fitting;  /* whether the recurrence is the better guess */
     int slow;     /* how many of the last steps took more than one iteration */
     int patience; /* how many of those before the recurrence is fitted again */
-    double past[190][vortices3_DIM]; /* values, the latest last */
-    double weight[32][vortices3_DIM][8]; /* of past values, the latest first, for the next values */
+    double past[222][vortices3_DIM]; /* values, the latest last */
+    double weight[40][vortices3_DIM][8]; /* of past values, the latest first, for the next values */
 } vortices3_memory;
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with vortices3_init. */

@@ -18,10 +18,10 @@ HISTORY = 8
 
 #: Past values that the fitted recurrence may use, a multiple of 8, and values that it is fitted to; fewer where the
 #: solver would grow too large.
-WINDOW, FITTED, SMALLEST = 32, 96, 32
+WINDOW, FITTED, SMALLEST = 40, 112, 32
 
 #: The recurrence uses no more values than leave so little, in sizes of the largest.
-ENOUGH = 1e-12
+ENOUGH = 3e-12
 
 #: Values that a recurrence is not fitted to, but has to foresee, and how far it may be off, in sizes of the largest:
 #: beyond, the motion is chaotic or the step long, and other guesses are as good.
