@@ -56,7 +56,8 @@ class Ring:
 
     def support(self, element: Poly) -> tuple[int, ...]:
         """The coordinates that an element depends on, directly or inside a function, as indices."""
-        return tuple(i for i, c in enumerate(self.coordinates) if self.tower.depends_on(element, [c]))
+        names = self.tower.names_in(element)
+        return tuple(i for i, c in enumerate(self.coordinates) if c in names)
 
     def field(self, g: Poly) -> list[Poly]:
         """π∇g."""
@@ -88,9 +89,9 @@ class Ring:
     def rate(self, element: Poly, field: Sequence[Poly]) -> Poly:
         """The derivative of an element along a vector field; 0 as a polynomial if it vanishes."""
         found = self.tower.combine(
-            field[j] * self.tower.derivative(element, c)
-            for j, c in enumerate(self.coordinates)
-            if field[j] != 0 and self.tower.depends_on(element, [c])
+            field[j] * self.tower.derivative(element, self.coordinates[j])
+            for j in self.support(element)
+            if field[j] != 0
         )
         return self.tower.zero if self.tower.is_zero(found) else self.lowest(found)
 

@@ -318,18 +318,20 @@ class Tower:
 
     def depends_on(self, element: Poly, names: Iterable[str]) -> bool:
         """Whether some of the symbols occur, directly or inside a generator."""
-        if element == 0:  # whose degrees are −1
-            return False
-        wanted = set(names)
-        degrees = element.degrees()
-        for i, n in enumerate(self.names):
-            if degrees[i] and (n in wanted or (i >= len(self.symbols) and self._generator_uses(i, wanted))):
-                return True
-        return False
+        return not self.names_in(element).isdisjoint(names)
 
-    def _generator_uses(self, index: int, wanted: set[str]) -> bool:
-        g = self.generators[index - len(self.symbols)]
-        return any(self.depends_on(a, wanted) for a in g.arguments)
+    def names_in(self, element: Poly) -> set[str]:
+        """The symbols and generators that occur, directly or inside a generator."""
+        if element == 0:  # whose degrees are −1
+            return set()
+        found: set[str] = set()
+        for i, degree in enumerate(element.degrees()):
+            if degree and i < len(self.symbols):
+                found.add(self.symbols[i])
+            elif degree:
+                g = self.generators[i - len(self.symbols)]
+                found |= {g.name}.union(*(self.names_in(a) for a in g.arguments))
+        return found
 
     # -- deciding ---------------------------------------------------------------------------------
 
