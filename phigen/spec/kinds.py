@@ -307,9 +307,9 @@ class Record(Kind):
         return f"a mapping ({self.what})"
 
     def read(self, node: Node, path: Path, reader: Reader) -> dict[str, Any] | None:
-        if not isinstance(node, MappingNode):
-            return self.mismatch(node, path, reader)
         known = {f.key: f for f in self.fields}
+        if not isinstance(node, MappingNode):
+            return self.mismatch(node, path, reader, "keys: " + ", ".join(known))
         values = {}
         for name, (key, item) in node.entries.items():
             if name in self.planned:
