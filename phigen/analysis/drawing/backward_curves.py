@@ -9,7 +9,7 @@ import numpy as np
 
 from phigen.analysis.backward import Constancy
 from phigen.analysis.drawing.error_curves import LINES, ROUNDING, windowed_maxima
-from phigen.analysis.drawing.palette import PALETTE, SERIES
+from phigen.analysis.drawing.palette import MARK, SERIES
 
 
 def draw_along(axes: Any, found: Constancy) -> None:
@@ -34,7 +34,7 @@ def draw_against_step(axes: Any, found: Constancy) -> None:
                       color=SERIES[m], linewidth=0.6, alpha=0.7, zorder=1)  # fmt: skip
     axes.set(xlabel="step h", xscale="log", yscale="log", title=f"largest change up to t = {found.end:.4g}")
     _finish(axes)
-    axes.axhline(ROUNDING, color=PALETTE["muted"], linewidth=0.8, linestyle=(0, (1, 2)), zorder=1)
+    axes.axhline(ROUNDING, **MARK)
     axes.legend(loc="best")
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from phigen.analysis.arrays import Floats
-from phigen.analysis.drawing.palette import PALETTE, SERIES
+from phigen.analysis.drawing.palette import MARK, SERIES
 from phigen.analysis.summary import errors_of
 from phigen.runtime.trajectory import Trajectory
 
@@ -86,7 +86,7 @@ def _draw_panel(axes: Any, curves: Mapping[str, tuple[Floats, Floats]]) -> None:
     axes.set(yscale="log", ylim=(10.0 ** (lowest - (1.4 if zeros else 0.1)), 10.0 ** (highest + 0.1)))
     _set_ticks(axes, lowest, highest, zero if zeros else None)
     axes.grid(True)
-    axes.axhline(ROUNDING, color=PALETTE["muted"], linewidth=0.8, linestyle=(0, (1, 2)), zorder=1)
+    axes.axhline(ROUNDING, **MARK)
     for place, (label, (t, values)) in enumerate(curves.items()):
         style: dict[str, Any] = {"color": SERIES[place % len(SERIES)], "zorder": 3 - 0.1 * place}
         line = LINES[place % len(LINES)]

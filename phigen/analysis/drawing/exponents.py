@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from phigen.analysis.drawing.palette import PALETTE, SERIES
+from phigen.analysis.drawing.palette import MARK, PALETTE, SERIES
 
 if TYPE_CHECKING:
     from phigen.analysis.lyapunov import Spectrum
@@ -17,7 +17,7 @@ HEIGHT = 2.4
 
 def draw_exponents(axes: Any, spectrum: Spectrum) -> None:
     """All exponents against the time over which they were taken, the largest on top of the others."""
-    axes.axhline(0, color=PALETTE["muted"], linewidth=0.8, linestyle=(0, (1, 2)), zorder=1)
+    axes.axhline(0, **MARK)
     for values in spectrum.history.T[:0:-1]:
         axes.plot(spectrum.times, values, color=PALETTE["leaf"], linewidth=0.9, zorder=2)
     axes.plot(spectrum.times, spectrum.history[:, 0], color=SERIES[0], linewidth=1.4, zorder=3)

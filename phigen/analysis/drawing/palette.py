@@ -75,6 +75,10 @@ _STYLE: Any = {
 }
 
 
+#: A level that curves are compared with: rounding, an accuracy, zero.
+MARK: Mapping[str, Any] = {"color": PALETTE["muted"], "linewidth": 0.8, "linestyle": (0, (1, 2)), "zorder": 1}
+
+
 def require_matplotlib() -> None:
     """Raises `ToolchainError` if it is not installed."""
     try:

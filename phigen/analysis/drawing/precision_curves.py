@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from phigen.analysis.drawing.error_curves import LINES
-from phigen.analysis.drawing.palette import PALETTE, SERIES
+from phigen.analysis.drawing.palette import MARK, SERIES
 from phigen.analysis.precision import Curve, Study
 
 _MARKERS = "osD^vX"
@@ -61,7 +61,7 @@ def _draw_slope(axes: Any, curve: Curve) -> None:
 def _finish(axes: Any, floor: float | None = None) -> None:
     axes.set(xscale="log", yscale="log")
     if floor is not None:
-        axes.axhline(floor, color=PALETTE["muted"], linewidth=0.8, linestyle=(0, (1, 2)), zorder=1)
+        axes.axhline(floor, **MARK)
     axes.grid(True)
     axes.minorticks_off()
     axes.legend(loc="best")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from phigen.analysis.drawing.error_curves import LINES
-from phigen.analysis.drawing.palette import PALETTE, SERIES
+from phigen.analysis.drawing.palette import MARK, PALETTE, SERIES
 
 if TYPE_CHECKING:
     from phigen.analysis.tuning.search import Curve
@@ -36,7 +36,7 @@ def draw_tuning(axes: Any, found: Tuning) -> None:
         )  # fmt: skip
     if others:
         axes.plot([], [], color=PALETTE["grid"], linewidth=0.8, label="other candidates")
-    axes.axhline(found.accuracy, color=PALETTE["muted"], linewidth=0.8, linestyle=(0, (1, 2)), zorder=1)
+    axes.axhline(found.accuracy, **MARK)
     what = "energy error" if found.measure == "energy" else "error of the orbit"
     axes.set(
         xscale="log", yscale="log", xlabel="CPU time of the run, ms",

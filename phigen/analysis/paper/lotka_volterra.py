@@ -11,7 +11,7 @@ import numpy as np
 from phigen.analysis import classical
 from phigen.analysis.arrays import Floats
 from phigen.analysis.drawing.error_curves import ROUNDING
-from phigen.analysis.drawing.palette import PALETTE, SERIES, styled
+from phigen.analysis.drawing.palette import MARK, PALETTE, SERIES, styled
 from phigen.analysis.methods import field_of
 from phigen.analysis.paper.plate import Finding, Plate, compiled, relative, trajectory_of
 from phigen.analysis.summary import exact_solution
@@ -116,7 +116,7 @@ def _draw_errors(found: Approach) -> Figure:
                         zorder=4 if label == PHI else 3)  # fmt: skip
     for axes, what in zip(panels, ("solution", "Casimir", "energy"), strict=True):
         axes.set(title=f"relative error of the {what}", xlabel="time left to the singularity", ylim=(2e-17, 2))
-        axes.axhline(ROUNDING, color=PALETTE["muted"], linewidth=0.8, linestyle=(0, (1, 2)), zorder=1)
+        axes.axhline(ROUNDING, **MARK)
         axes.grid(True)
     panels[0].invert_xaxis()
     for axes in panels[1:]:
