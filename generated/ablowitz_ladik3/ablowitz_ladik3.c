@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 53404512addf8ca57770904156d8264b99b8b377e5d23f4fae23e7a84f1b8bac
+ * body-sha256: a85efc333de33d195bc977c65cef423f95470f41760c73f467fe2a0f274b2b8c
  */
 #include "ablowitz_ladik3.h"
 
@@ -338,20 +338,22 @@ static void ablowitz_ladik3_remember(ablowitz_ladik3_memory *memory, const doubl
    away, at another energy, that has nothing to do with it. */
 static int ablowitz_ladik3_plausible(const ablowitz_ladik3_solver *s, int stage, const double increment[6])
 {
-    double moved = 0.0, size = 0.0, field[6], end[6];
+    double moved = 0.0, size = 0.0, field[6], middle[6], end[6];
     for (int i = 0; i < 6; ++i) {
         moved += fabs(increment[i]);
         size += fabs(s->x[i]);
     }
-    if (moved <= 2.0 * size) return 1;
+    if (moved <= 1.5 * size) return 1;
     ablowitz_ladik3_vector_field(&s->params, s->x, field);
     for (int i = 0; i < 6; ++i) {
         size += fabs(ablowitz_ladik3_fractions[stage] * s->h * field[i]);
+        middle[i] = s->x[i] + 0.5 * increment[i];
         end[i] = s->x[i] + increment[i];
     }
-    if (moved <= 2.0 * size) return 1;
+    if (moved <= 1.5 * size) return 1;
     const double before = ablowitz_ladik3_hamiltonian(&s->params, s->x), after = ablowitz_ladik3_hamiltonian(&s->params, end);
-    return fabs(after - before) <= 0.5 * (fabs(before) + fabs(after));
+    const double scale = fabs(before) + fabs(ablowitz_ladik3_hamiltonian(&s->params, middle)) + fabs(after);
+    return fabs(after - before) <= 0.5 * scale;
 }
 
 /* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last

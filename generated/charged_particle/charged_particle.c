@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: fd3f5e6505e77c59967e02f500d0829a00420de3908f1b92cea4abc41fadc867
+ * body-sha256: 3e697c42854203ab50e33d048fc549371428a9589d0cba6c5c25a79edf36e57d
  */
 #include "charged_particle.h"
 
@@ -354,20 +354,22 @@ static void charged_particle_remember(charged_particle_memory *memory, const dou
    away, at another energy, that has nothing to do with it. */
 static int charged_particle_plausible(const charged_particle_solver *s, int stage, const double increment[6])
 {
-    double moved = 0.0, size = 0.0, field[6], end[6];
+    double moved = 0.0, size = 0.0, field[6], middle[6], end[6];
     for (int i = 0; i < 6; ++i) {
         moved += fabs(increment[i]);
         size += fabs(s->x[i]);
     }
-    if (moved <= 2.0 * size) return 1;
+    if (moved <= 1.5 * size) return 1;
     charged_particle_vector_field(&s->params, s->x, field);
     for (int i = 0; i < 6; ++i) {
         size += fabs(charged_particle_fractions[stage] * s->h * field[i]);
+        middle[i] = s->x[i] + 0.5 * increment[i];
         end[i] = s->x[i] + increment[i];
     }
-    if (moved <= 2.0 * size) return 1;
+    if (moved <= 1.5 * size) return 1;
     const double before = charged_particle_hamiltonian(&s->params, s->x), after = charged_particle_hamiltonian(&s->params, end);
-    return fabs(after - before) <= 0.5 * (fabs(before) + fabs(after));
+    const double scale = fabs(before) + fabs(charged_particle_hamiltonian(&s->params, middle)) + fabs(after);
+    return fabs(after - before) <= 0.5 * scale;
 }
 
 /* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last

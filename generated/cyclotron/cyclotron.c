@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: dc8ff17ca65c8867e2b7b8806fdff6755d8435a869d2f39ae8c06c5abf893a27
+ * body-sha256: d8ad9eed84ec50b5c9d47d91c0bc5a5f11ae1abd1f8d4dab1984d28fe266a6ff
  */
 #include "cyclotron.h"
 
@@ -325,20 +325,22 @@ static void cyclotron_remember(cyclotron_memory *memory, const double value[3], 
    away, at another energy, that has nothing to do with it. */
 static int cyclotron_plausible(const cyclotron_solver *s, int stage, const double increment[3])
 {
-    double moved = 0.0, size = 0.0, field[3], end[3];
+    double moved = 0.0, size = 0.0, field[3], middle[3], end[3];
     for (int i = 0; i < 3; ++i) {
         moved += fabs(increment[i]);
         size += fabs(s->x[i]);
     }
-    if (moved <= 2.0 * size) return 1;
+    if (moved <= 1.5 * size) return 1;
     cyclotron_vector_field(&s->params, s->x, field);
     for (int i = 0; i < 3; ++i) {
         size += fabs(cyclotron_fractions[stage] * s->h * field[i]);
+        middle[i] = s->x[i] + 0.5 * increment[i];
         end[i] = s->x[i] + increment[i];
     }
-    if (moved <= 2.0 * size) return 1;
+    if (moved <= 1.5 * size) return 1;
     const double before = cyclotron_hamiltonian(&s->params, s->x), after = cyclotron_hamiltonian(&s->params, end);
-    return fabs(after - before) <= 0.5 * (fabs(before) + fabs(after));
+    const double scale = fabs(before) + fabs(cyclotron_hamiltonian(&s->params, middle)) + fabs(after);
+    return fabs(after - before) <= 0.5 * scale;
 }
 
 /* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last

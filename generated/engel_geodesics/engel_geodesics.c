@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: f6381ec65e1437fa87cacb37522d6509c38d3525d75a3c33448b332895c6a96b
+ * body-sha256: b87dfadb9a1798a9b1399a83308e8eab79884c0ce6fd449e3d4772ea15bbe162
  */
 #include "engel_geodesics.h"
 
@@ -362,20 +362,22 @@ static void engel_geodesics_remember(engel_geodesics_memory *memory, const doubl
    away, at another energy, that has nothing to do with it. */
 static int engel_geodesics_plausible(const engel_geodesics_solver *s, int stage, const double increment[4])
 {
-    double moved = 0.0, size = 0.0, field[4], end[4];
+    double moved = 0.0, size = 0.0, field[4], middle[4], end[4];
     for (int i = 0; i < 4; ++i) {
         moved += fabs(increment[i]);
         size += fabs(s->x[i]);
     }
-    if (moved <= 2.0 * size) return 1;
+    if (moved <= 1.5 * size) return 1;
     engel_geodesics_vector_field(&s->params, s->x, field);
     for (int i = 0; i < 4; ++i) {
         size += fabs(engel_geodesics_fractions[stage] * s->h * field[i]);
+        middle[i] = s->x[i] + 0.5 * increment[i];
         end[i] = s->x[i] + increment[i];
     }
-    if (moved <= 2.0 * size) return 1;
+    if (moved <= 1.5 * size) return 1;
     const double before = engel_geodesics_hamiltonian(&s->params, s->x), after = engel_geodesics_hamiltonian(&s->params, end);
-    return fabs(after - before) <= 0.5 * (fabs(before) + fabs(after));
+    const double scale = fabs(before) + fabs(engel_geodesics_hamiltonian(&s->params, middle)) + fabs(after);
+    return fabs(after - before) <= 0.5 * scale;
 }
 
 /* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last

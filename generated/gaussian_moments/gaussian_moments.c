@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 6f1f2b1f4587cc5b54c4edcb7b2e9bcbcd5a4e1162ba6536ca817f9325e4e717
+ * body-sha256: b4020a0ba4de4145735448dbd7fc17ae49db38db2c0d2a347df8365817978729
  */
 #include "gaussian_moments.h"
 
@@ -476,20 +476,22 @@ static void gaussian_moments_remember(gaussian_moments_memory *memory, const dou
    away, at another energy, that has nothing to do with it. */
 static int gaussian_moments_plausible(const gaussian_moments_solver *s, int stage, const double increment[3])
 {
-    double moved = 0.0, size = 0.0, field[3], end[3];
+    double moved = 0.0, size = 0.0, field[3], middle[3], end[3];
     for (int i = 0; i < 3; ++i) {
         moved += fabs(increment[i]);
         size += fabs(s->x[i]);
     }
-    if (moved <= 2.0 * size) return 1;
+    if (moved <= 1.5 * size) return 1;
     gaussian_moments_vector_field(&s->params, s->x, field);
     for (int i = 0; i < 3; ++i) {
         size += fabs(gaussian_moments_fractions[stage] * s->h * field[i]);
+        middle[i] = s->x[i] + 0.5 * increment[i];
         end[i] = s->x[i] + increment[i];
     }
-    if (moved <= 2.0 * size) return 1;
+    if (moved <= 1.5 * size) return 1;
     const double before = gaussian_moments_hamiltonian(&s->params, s->x), after = gaussian_moments_hamiltonian(&s->params, end);
-    return fabs(after - before) <= 0.5 * (fabs(before) + fabs(after));
+    const double scale = fabs(before) + fabs(gaussian_moments_hamiltonian(&s->params, middle)) + fabs(after);
+    return fabs(after - before) <= 0.5 * scale;
 }
 
 /* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last

@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: c54bd5462a146f837d670e87f09e4091904583efb895e66e1c1cf25471aad434
+ * body-sha256: 2a409da711cd3fdca109b4181722e3289226e82d982fee5ae5d46f8a4aa182ec
  */
 #include "guiding_centre.h"
 
@@ -356,20 +356,22 @@ static void guiding_centre_remember(guiding_centre_memory *memory, const double 
    away, at another energy, that has nothing to do with it. */
 static int guiding_centre_plausible(const guiding_centre_solver *s, int stage, const double increment[4])
 {
-    double moved = 0.0, size = 0.0, field[4], end[4];
+    double moved = 0.0, size = 0.0, field[4], middle[4], end[4];
     for (int i = 0; i < 4; ++i) {
         moved += fabs(increment[i]);
         size += fabs(s->x[i]);
     }
-    if (moved <= 2.0 * size) return 1;
+    if (moved <= 1.5 * size) return 1;
     guiding_centre_vector_field(&s->params, s->x, field);
     for (int i = 0; i < 4; ++i) {
         size += fabs(guiding_centre_fractions[stage] * s->h * field[i]);
+        middle[i] = s->x[i] + 0.5 * increment[i];
         end[i] = s->x[i] + increment[i];
     }
-    if (moved <= 2.0 * size) return 1;
+    if (moved <= 1.5 * size) return 1;
     const double before = guiding_centre_hamiltonian(&s->params, s->x), after = guiding_centre_hamiltonian(&s->params, end);
-    return fabs(after - before) <= 0.5 * (fabs(before) + fabs(after));
+    const double scale = fabs(before) + fabs(guiding_centre_hamiltonian(&s->params, middle)) + fabs(after);
+    return fabs(after - before) <= 0.5 * scale;
 }
 
 /* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 9e449ae71f033fc8932fdc9c5a9d1a4b33db6a6fa350677bf981332d15d0c720
+ * body-sha256: 63bc5f366f82fa123b4f0a13a79300d52e9f6bb08b975d8f6c2ada590ef3fa0d
  */
 #include "harmonic_oscillator.h"
 
@@ -307,20 +307,22 @@ static void harmonic_oscillator_remember(harmonic_oscillator_memory *memory, con
    away, at another energy, that has nothing to do with it. */
 static int harmonic_oscillator_plausible(const harmonic_oscillator_solver *s, int stage, const double increment[2])
 {
-    double moved = 0.0, size = 0.0, field[2], end[2];
+    double moved = 0.0, size = 0.0, field[2], middle[2], end[2];
     for (int i = 0; i < 2; ++i) {
         moved += fabs(increment[i]);
         size += fabs(s->x[i]);
     }
-    if (moved <= 2.0 * size) return 1;
+    if (moved <= 1.5 * size) return 1;
     harmonic_oscillator_vector_field(&s->params, s->x, field);
     for (int i = 0; i < 2; ++i) {
         size += fabs(harmonic_oscillator_fractions[stage] * s->h * field[i]);
+        middle[i] = s->x[i] + 0.5 * increment[i];
         end[i] = s->x[i] + increment[i];
     }
-    if (moved <= 2.0 * size) return 1;
+    if (moved <= 1.5 * size) return 1;
     const double before = harmonic_oscillator_hamiltonian(&s->params, s->x), after = harmonic_oscillator_hamiltonian(&s->params, end);
-    return fabs(after - before) <= 0.5 * (fabs(before) + fabs(after));
+    const double scale = fabs(before) + fabs(harmonic_oscillator_hamiltonian(&s->params, middle)) + fabs(after);
+    return fabs(after - before) <= 0.5 * scale;
 }
 
 /* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last

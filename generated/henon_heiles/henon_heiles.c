@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 7071447fdbf675e34aecc3085dd7ce5fb0edf26fe624f4aca91ec6d98d16d2e3
+ * body-sha256: c2341d10b31671c37e64a9d738655ed6f0cbcc68b1ec9a22a928c03ebaefcef1
  */
 #include "henon_heiles.h"
 
@@ -411,20 +411,22 @@ static void henon_heiles_remember(henon_heiles_memory *memory, const double valu
    away, at another energy, that has nothing to do with it. */
 static int henon_heiles_plausible(const henon_heiles_solver *s, int stage, const double increment[4])
 {
-    double moved = 0.0, size = 0.0, field[4], end[4];
+    double moved = 0.0, size = 0.0, field[4], middle[4], end[4];
     for (int i = 0; i < 4; ++i) {
         moved += fabs(increment[i]);
         size += fabs(s->x[i]);
     }
-    if (moved <= 2.0 * size) return 1;
+    if (moved <= 1.5 * size) return 1;
     henon_heiles_vector_field(&s->params, s->x, field);
     for (int i = 0; i < 4; ++i) {
         size += fabs(henon_heiles_fractions[stage] * s->h * field[i]);
+        middle[i] = s->x[i] + 0.5 * increment[i];
         end[i] = s->x[i] + increment[i];
     }
-    if (moved <= 2.0 * size) return 1;
+    if (moved <= 1.5 * size) return 1;
     const double before = henon_heiles_hamiltonian(&s->params, s->x), after = henon_heiles_hamiltonian(&s->params, end);
-    return fabs(after - before) <= 0.5 * (fabs(before) + fabs(after));
+    const double scale = fabs(before) + fabs(henon_heiles_hamiltonian(&s->params, middle)) + fabs(after);
+    return fabs(after - before) <= 0.5 * scale;
 }
 
 /* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last

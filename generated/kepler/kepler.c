@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: a956ba2f1879f1583b563e46994c20121f2fa8063cfcfea0cbc4529893325300
+ * body-sha256: af53a6d901fd992fe725fb2e65016d912e5513d8e898393e98ddcf94758229b8
  */
 #include "kepler.h"
 
@@ -722,20 +722,22 @@ static void kepler_remember(kepler_memory *memory, const double value[4], int it
    away, at another energy, that has nothing to do with it. */
 static int kepler_plausible(const kepler_solver *s, int stage, const double increment[4])
 {
-    double moved = 0.0, size = 0.0, field[4], end[4];
+    double moved = 0.0, size = 0.0, field[4], middle[4], end[4];
     for (int i = 0; i < 4; ++i) {
         moved += fabs(increment[i]);
         size += fabs(s->x[i]);
     }
-    if (moved <= 2.0 * size) return 1;
+    if (moved <= 1.5 * size) return 1;
     kepler_vector_field(&s->params, s->x, field);
     for (int i = 0; i < 4; ++i) {
         size += fabs(kepler_fractions[stage] * s->h * field[i]);
+        middle[i] = s->x[i] + 0.5 * increment[i];
         end[i] = s->x[i] + increment[i];
     }
-    if (moved <= 2.0 * size) return 1;
+    if (moved <= 1.5 * size) return 1;
     const double before = kepler_hamiltonian(&s->params, s->x), after = kepler_hamiltonian(&s->params, end);
-    return fabs(after - before) <= 0.5 * (fabs(before) + fabs(after));
+    const double scale = fabs(before) + fabs(kepler_hamiltonian(&s->params, middle)) + fabs(after);
+    return fabs(after - before) <= 0.5 * scale;
 }
 
 /* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 92ecc49bd0f456da649a9f3ac606b1fd470dacd015b33547c67f82f4b856bd4e
+ * body-sha256: b97c840ea0f2bd7ba993f06062d2ea3bf194d7ba42e4adb207303ad4caf5a1b2
  */
 #include "kowalevski_top.h"
 
@@ -1235,20 +1235,22 @@ static void kowalevski_top_remember(kowalevski_top_memory *memory, const double 
    away, at another energy, that has nothing to do with it. */
 static int kowalevski_top_plausible(const kowalevski_top_solver *s, int stage, const double increment[6])
 {
-    double moved = 0.0, size = 0.0, field[6], end[6];
+    double moved = 0.0, size = 0.0, field[6], middle[6], end[6];
     for (int i = 0; i < 6; ++i) {
         moved += fabs(increment[i]);
         size += fabs(s->x[i]);
     }
-    if (moved <= 2.0 * size) return 1;
+    if (moved <= 1.5 * size) return 1;
     kowalevski_top_vector_field(&s->params, s->x, field);
     for (int i = 0; i < 6; ++i) {
         size += fabs(kowalevski_top_fractions[stage] * s->h * field[i]);
+        middle[i] = s->x[i] + 0.5 * increment[i];
         end[i] = s->x[i] + increment[i];
     }
-    if (moved <= 2.0 * size) return 1;
+    if (moved <= 1.5 * size) return 1;
     const double before = kowalevski_top_hamiltonian(&s->params, s->x), after = kowalevski_top_hamiltonian(&s->params, end);
-    return fabs(after - before) <= 0.5 * (fabs(before) + fabs(after));
+    const double scale = fabs(before) + fabs(kowalevski_top_hamiltonian(&s->params, middle)) + fabs(after);
+    return fabs(after - before) <= 0.5 * scale;
 }
 
 /* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: d129cef6454cba553a366a20c6b5770ac54aaa0d87e5590e8eebe0614d4ad348
+ * body-sha256: 0bcb6843be3f1633541f1ee359cc6a84b5dae97658347a5bab3f4378724ddfd5
  */
 #include "lagrange_top.h"
 
@@ -829,20 +829,22 @@ static void lagrange_top_remember(lagrange_top_memory *memory, const double valu
    away, at another energy, that has nothing to do with it. */
 static int lagrange_top_plausible(const lagrange_top_solver *s, int stage, const double increment[6])
 {
-    double moved = 0.0, size = 0.0, field[6], end[6];
+    double moved = 0.0, size = 0.0, field[6], middle[6], end[6];
     for (int i = 0; i < 6; ++i) {
         moved += fabs(increment[i]);
         size += fabs(s->x[i]);
     }
-    if (moved <= 2.0 * size) return 1;
+    if (moved <= 1.5 * size) return 1;
     lagrange_top_vector_field(&s->params, s->x, field);
     for (int i = 0; i < 6; ++i) {
         size += fabs(lagrange_top_fractions[stage] * s->h * field[i]);
+        middle[i] = s->x[i] + 0.5 * increment[i];
         end[i] = s->x[i] + increment[i];
     }
-    if (moved <= 2.0 * size) return 1;
+    if (moved <= 1.5 * size) return 1;
     const double before = lagrange_top_hamiltonian(&s->params, s->x), after = lagrange_top_hamiltonian(&s->params, end);
-    return fabs(after - before) <= 0.5 * (fabs(before) + fabs(after));
+    const double scale = fabs(before) + fabs(lagrange_top_hamiltonian(&s->params, middle)) + fabs(after);
+    return fabs(after - before) <= 0.5 * scale;
 }
 
 /* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 7ca0743e864b15d8624b434f027780552d64c8d675301dab42c1e049288f5cfa
+ * body-sha256: ed084fc53c588eaa3f33d949a2620e87e82418570933c4d195823d8ecf178c24
  */
 #include "lotka_volterra.h"
 
@@ -346,20 +346,22 @@ static void lotka_volterra_remember(lotka_volterra_memory *memory, const double 
    away, at another energy, that has nothing to do with it. */
 static int lotka_volterra_plausible(const lotka_volterra_solver *s, int stage, const double increment[3])
 {
-    double moved = 0.0, size = 0.0, field[3], end[3];
+    double moved = 0.0, size = 0.0, field[3], middle[3], end[3];
     for (int i = 0; i < 3; ++i) {
         moved += fabs(increment[i]);
         size += fabs(s->x[i]);
     }
-    if (moved <= 2.0 * size) return 1;
+    if (moved <= 1.5 * size) return 1;
     lotka_volterra_vector_field(&s->params, s->x, field);
     for (int i = 0; i < 3; ++i) {
         size += fabs(lotka_volterra_fractions[stage] * s->h * field[i]);
+        middle[i] = s->x[i] + 0.5 * increment[i];
         end[i] = s->x[i] + increment[i];
     }
-    if (moved <= 2.0 * size) return 1;
+    if (moved <= 1.5 * size) return 1;
     const double before = lotka_volterra_hamiltonian(&s->params, s->x), after = lotka_volterra_hamiltonian(&s->params, end);
-    return fabs(after - before) <= 0.5 * (fabs(before) + fabs(after));
+    const double scale = fabs(before) + fabs(lotka_volterra_hamiltonian(&s->params, middle)) + fabs(after);
+    return fabs(after - before) <= 0.5 * scale;
 }
 
 /* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: bd210622a147e4ee94b7f237174b05e40b7240239fab171ad5dc6450ba1dddcc
+ * body-sha256: fe0cca19018a9ad1f669b58f129e5bf421b7586fbd76efc45244e600b208bbd0
  */
 #include "maxwell_bloch.h"
 
@@ -334,20 +334,22 @@ static void maxwell_bloch_remember(maxwell_bloch_memory *memory, const double va
    away, at another energy, that has nothing to do with it. */
 static int maxwell_bloch_plausible(const maxwell_bloch_solver *s, int stage, const double increment[3])
 {
-    double moved = 0.0, size = 0.0, field[3], end[3];
+    double moved = 0.0, size = 0.0, field[3], middle[3], end[3];
     for (int i = 0; i < 3; ++i) {
         moved += fabs(increment[i]);
         size += fabs(s->x[i]);
     }
-    if (moved <= 2.0 * size) return 1;
+    if (moved <= 1.5 * size) return 1;
     maxwell_bloch_vector_field(&s->params, s->x, field);
     for (int i = 0; i < 3; ++i) {
         size += fabs(maxwell_bloch_fractions[stage] * s->h * field[i]);
+        middle[i] = s->x[i] + 0.5 * increment[i];
         end[i] = s->x[i] + increment[i];
     }
-    if (moved <= 2.0 * size) return 1;
+    if (moved <= 1.5 * size) return 1;
     const double before = maxwell_bloch_hamiltonian(&s->params, s->x), after = maxwell_bloch_hamiltonian(&s->params, end);
-    return fabs(after - before) <= 0.5 * (fabs(before) + fabs(after));
+    const double scale = fabs(before) + fabs(maxwell_bloch_hamiltonian(&s->params, middle)) + fabs(after);
+    return fabs(after - before) <= 0.5 * scale;
 }
 
 /* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 39231ec3a975b50106862252b70d21c176d606fbe36d4025312be918a4772a99
+ * body-sha256: e634da853f1fabb1c514e72c38ff67ef319201661643f7950777af5b3bc3fafb
  */
 #include "nambu_pendulum.h"
 
@@ -307,20 +307,22 @@ static void nambu_pendulum_remember(nambu_pendulum_memory *memory, const double 
    away, at another energy, that has nothing to do with it. */
 static int nambu_pendulum_plausible(const nambu_pendulum_solver *s, int stage, const double increment[3])
 {
-    double moved = 0.0, size = 0.0, field[3], end[3];
+    double moved = 0.0, size = 0.0, field[3], middle[3], end[3];
     for (int i = 0; i < 3; ++i) {
         moved += fabs(increment[i]);
         size += fabs(s->x[i]);
     }
-    if (moved <= 2.0 * size) return 1;
+    if (moved <= 1.5 * size) return 1;
     nambu_pendulum_vector_field(&s->params, s->x, field);
     for (int i = 0; i < 3; ++i) {
         size += fabs(nambu_pendulum_fractions[stage] * s->h * field[i]);
+        middle[i] = s->x[i] + 0.5 * increment[i];
         end[i] = s->x[i] + increment[i];
     }
-    if (moved <= 2.0 * size) return 1;
+    if (moved <= 1.5 * size) return 1;
     const double before = nambu_pendulum_hamiltonian(&s->params, s->x), after = nambu_pendulum_hamiltonian(&s->params, end);
-    return fabs(after - before) <= 0.5 * (fabs(before) + fabs(after));
+    const double scale = fabs(before) + fabs(nambu_pendulum_hamiltonian(&s->params, middle)) + fabs(after);
+    return fabs(after - before) <= 0.5 * scale;
 }
 
 /* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 0b7c8fb7348eb31f5b15cad50bd335a789f68e3698fca1584340bffa6c0e0e9f
+ * body-sha256: 352cccf1964dee0fdbd2ccf236971b85a054825765917b687b2455db2a8399f1
  */
 #include "pendulum.h"
 
@@ -340,20 +340,22 @@ static void pendulum_remember(pendulum_memory *memory, const double value[2], in
    away, at another energy, that has nothing to do with it. */
 static int pendulum_plausible(const pendulum_solver *s, int stage, const double increment[2])
 {
-    double moved = 0.0, size = 0.0, field[2], end[2];
+    double moved = 0.0, size = 0.0, field[2], middle[2], end[2];
     for (int i = 0; i < 2; ++i) {
         moved += fabs(increment[i]);
         size += fabs(s->x[i]);
     }
-    if (moved <= 2.0 * size) return 1;
+    if (moved <= 1.5 * size) return 1;
     pendulum_vector_field(&s->params, s->x, field);
     for (int i = 0; i < 2; ++i) {
         size += fabs(pendulum_fractions[stage] * s->h * field[i]);
+        middle[i] = s->x[i] + 0.5 * increment[i];
         end[i] = s->x[i] + increment[i];
     }
-    if (moved <= 2.0 * size) return 1;
+    if (moved <= 1.5 * size) return 1;
     const double before = pendulum_hamiltonian(&s->params, s->x), after = pendulum_hamiltonian(&s->params, end);
-    return fabs(after - before) <= 0.5 * (fabs(before) + fabs(after));
+    const double scale = fabs(before) + fabs(pendulum_hamiltonian(&s->params, middle)) + fabs(after);
+    return fabs(after - before) <= 0.5 * scale;
 }
 
 /* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last

@@ -12,7 +12,7 @@
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 4679a9af95cc302dbbf5f4d45b3b037b69c2ef268795572b24c571ff7d92140e
+# body-sha256: 5caab2fbd1f42f803678e7d4cecee1b3fb46d004e65ff2d6f1bcf7396f4629f1
 import numpy as np
 
 VERSION = "0.1.0"
@@ -86,9 +86,9 @@ def _explicit(coef, state):
     return _filled(state, [coef[1] * (p - t1), -t1])
 
 
-def _advance(coef, x, carry, memory):
+def _advance(stage, x, carry, memory):
     """One stage of all members."""
-    following, rest = _sum(x, carry, _explicit(coef, x))
+    following, rest = _sum(x, carry, _explicit(stage[0], x))
     good = np.isfinite(following).all(axis=-1)
     return following, rest, memory, np.where(good, "", "NOT_FINITE")
 
@@ -98,22 +98,26 @@ def _choose_gauge(parameters, x):
     return np.zeros((len(x), 0))
 
 
+def _coefficients(parameters, x, h, gauge):
+    """What does not depend on the state, for each stage: coefficients, parameters and the step of the stage.
+
+    The coefficients are arrays (coefficients, members), or (coefficients, 1).
+    """
+    stages = [fraction * h for fraction in FRACTIONS]
+    if not GAUGE:
+        return [(np.array(_prepare(parameters, step)).reshape(-1, 1), parameters, step) for step in stages]
+    chosen = _choose_gauge(parameters, x) if gauge is None else np.broadcast_to(gauge, (len(x), len(GAUGE)))
+    return [
+        (np.array([c + np.zeros(len(x)) for c in _prepare(parameters, chosen.T, step)]), parameters, step)
+        for step in stages
+    ]
+
+
 def gauge(x, **parameters):
     """The multiples of the Casimirs in GAUGE that integrate() chooses for trajectories from x: (..., len(GAUGE))."""
     x = np.asarray(x, dtype=float)
     with np.errstate(all="ignore"):
         return _choose_gauge(_values(parameters), x.reshape(-1, DIM)).reshape(x.shape[:-1] + (len(GAUGE),))
-
-
-def _coefficients(parameters, x, h, gauge):
-    """What does not depend on the state, for each stage: arrays (coefficients, members), or (coefficients, 1)."""
-    if not GAUGE:
-        return [np.array(_prepare(parameters, fraction * h)).reshape(-1, 1) for fraction in FRACTIONS]
-    chosen = _choose_gauge(parameters, x) if gauge is None else np.broadcast_to(gauge, (len(x), len(GAUGE)))
-    return [
-        np.array([c + np.zeros(len(x)) for c in _prepare(parameters, chosen.T, fraction * h)])
-        for fraction in FRACTIONS
-    ]
 
 
 def step(x, h, gauge=None, **parameters):
@@ -141,11 +145,11 @@ def integrate(x0, h, steps, stride=1, gauge=None, **parameters):
     memory = [(carry, carry)] * len(FRACTIONS)
     rows = [x]
     with np.errstate(all="ignore"):
-        coef = _coefficients(_values(parameters), x, float(h), gauge)
+        stages = _coefficients(_values(parameters), x, float(h), gauge)
         for done in range(steps):
             following = x
-            for stage in range(len(FRACTIONS)):
-                following, carry, memory[stage], status = _advance(coef[stage], following, carry, memory[stage])
+            for k, stage in enumerate(stages):
+                following, carry, memory[k], status = _advance(stage, following, carry, memory[k])
                 if (status != "").any():
                     break
             failed = np.flatnonzero(status != "")

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 059c641dd3107fe8cc9194db1e96c52b6b76d626c55f759c88c79aad49795d43
+ * body-sha256: 1bd53dab2e96f9ffe97586305c0fb4340be55da6bf7fc0c083a924d987b1bf20
  */
 #include "poisson_not_hamiltonian.h"
 
@@ -443,20 +443,22 @@ static void poisson_not_hamiltonian_remember(poisson_not_hamiltonian_memory *mem
    away, at another energy, that has nothing to do with it. */
 static int poisson_not_hamiltonian_plausible(const poisson_not_hamiltonian_solver *s, int stage, const double increment[3])
 {
-    double moved = 0.0, size = 0.0, field[3], end[3];
+    double moved = 0.0, size = 0.0, field[3], middle[3], end[3];
     for (int i = 0; i < 3; ++i) {
         moved += fabs(increment[i]);
         size += fabs(s->x[i]);
     }
-    if (moved <= 2.0 * size) return 1;
+    if (moved <= 1.5 * size) return 1;
     poisson_not_hamiltonian_vector_field(&s->params, s->x, field);
     for (int i = 0; i < 3; ++i) {
         size += fabs(poisson_not_hamiltonian_fractions[stage] * s->h * field[i]);
+        middle[i] = s->x[i] + 0.5 * increment[i];
         end[i] = s->x[i] + increment[i];
     }
-    if (moved <= 2.0 * size) return 1;
+    if (moved <= 1.5 * size) return 1;
     const double before = poisson_not_hamiltonian_hamiltonian(&s->params, s->x), after = poisson_not_hamiltonian_hamiltonian(&s->params, end);
-    return fabs(after - before) <= 0.5 * (fabs(before) + fabs(after));
+    const double scale = fabs(before) + fabs(poisson_not_hamiltonian_hamiltonian(&s->params, middle)) + fabs(after);
+    return fabs(after - before) <= 0.5 * scale;
 }
 
 /* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last

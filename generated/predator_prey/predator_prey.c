@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 00e2793b7153d6f3db807529a25fd63f95d415acaf0e7c195abee8994b9a55e4
+ * body-sha256: 4dc57272f5fc4aa80e6d5b7e84bace5364befe3dc6b0229769e1810a4f22c485
  */
 #include "predator_prey.h"
 
@@ -341,20 +341,22 @@ static void predator_prey_remember(predator_prey_memory *memory, const double va
    away, at another energy, that has nothing to do with it. */
 static int predator_prey_plausible(const predator_prey_solver *s, int stage, const double increment[2])
 {
-    double moved = 0.0, size = 0.0, field[2], end[2];
+    double moved = 0.0, size = 0.0, field[2], middle[2], end[2];
     for (int i = 0; i < 2; ++i) {
         moved += fabs(increment[i]);
         size += fabs(s->x[i]);
     }
-    if (moved <= 2.0 * size) return 1;
+    if (moved <= 1.5 * size) return 1;
     predator_prey_vector_field(&s->params, s->x, field);
     for (int i = 0; i < 2; ++i) {
         size += fabs(predator_prey_fractions[stage] * s->h * field[i]);
+        middle[i] = s->x[i] + 0.5 * increment[i];
         end[i] = s->x[i] + increment[i];
     }
-    if (moved <= 2.0 * size) return 1;
+    if (moved <= 1.5 * size) return 1;
     const double before = predator_prey_hamiltonian(&s->params, s->x), after = predator_prey_hamiltonian(&s->params, end);
-    return fabs(after - before) <= 0.5 * (fabs(before) + fabs(after));
+    const double scale = fabs(before) + fabs(predator_prey_hamiltonian(&s->params, middle)) + fabs(after);
+    return fabs(after - before) <= 0.5 * scale;
 }
 
 /* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last

@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: b9ac78b1e090cf0ff4f15ed27a358ff3edca66827f18eebdac2863c4a001de80
+ * body-sha256: 4feca9e7c903fad727a8dd4edb22d98e2c694c63f18e555ce00d1d98a14eccb9
  */
 #include "rigid_body.h"
 
@@ -608,20 +608,22 @@ static void rigid_body_remember(rigid_body_memory *memory, const double value[3]
    away, at another energy, that has nothing to do with it. */
 static int rigid_body_plausible(const rigid_body_solver *s, int stage, const double increment[3])
 {
-    double moved = 0.0, size = 0.0, field[3], end[3];
+    double moved = 0.0, size = 0.0, field[3], middle[3], end[3];
     for (int i = 0; i < 3; ++i) {
         moved += fabs(increment[i]);
         size += fabs(s->x[i]);
     }
-    if (moved <= 2.0 * size) return 1;
+    if (moved <= 1.5 * size) return 1;
     rigid_body_vector_field(&s->params, s->x, field);
     for (int i = 0; i < 3; ++i) {
         size += fabs(rigid_body_fractions[stage] * s->h * field[i]);
+        middle[i] = s->x[i] + 0.5 * increment[i];
         end[i] = s->x[i] + increment[i];
     }
-    if (moved <= 2.0 * size) return 1;
+    if (moved <= 1.5 * size) return 1;
     const double before = rigid_body_hamiltonian(&s->params, s->x), after = rigid_body_hamiltonian(&s->params, end);
-    return fabs(after - before) <= 0.5 * (fabs(before) + fabs(after));
+    const double scale = fabs(before) + fabs(rigid_body_hamiltonian(&s->params, middle)) + fabs(after);
+    return fabs(after - before) <= 0.5 * scale;
 }
 
 /* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last

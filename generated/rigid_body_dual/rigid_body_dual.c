@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 9aa2fe25a42a9382f2d385477bf3edfe578407ab329b8ca6051ef7411a0f9e2e
+ * body-sha256: 7fc11c4f5e8b3ba724a09b6a693c61f06eae4fa7ca15a23d5e758fb66867affb
  */
 #include "rigid_body_dual.h"
 
@@ -494,20 +494,22 @@ static void rigid_body_dual_remember(rigid_body_dual_memory *memory, const doubl
    away, at another energy, that has nothing to do with it. */
 static int rigid_body_dual_plausible(const rigid_body_dual_solver *s, int stage, const double increment[3])
 {
-    double moved = 0.0, size = 0.0, field[3], end[3];
+    double moved = 0.0, size = 0.0, field[3], middle[3], end[3];
     for (int i = 0; i < 3; ++i) {
         moved += fabs(increment[i]);
         size += fabs(s->x[i]);
     }
-    if (moved <= 2.0 * size) return 1;
+    if (moved <= 1.5 * size) return 1;
     rigid_body_dual_vector_field(&s->params, s->x, field);
     for (int i = 0; i < 3; ++i) {
         size += fabs(rigid_body_dual_fractions[stage] * s->h * field[i]);
+        middle[i] = s->x[i] + 0.5 * increment[i];
         end[i] = s->x[i] + increment[i];
     }
-    if (moved <= 2.0 * size) return 1;
+    if (moved <= 1.5 * size) return 1;
     const double before = rigid_body_dual_hamiltonian(&s->params, s->x), after = rigid_body_dual_hamiltonian(&s->params, end);
-    return fabs(after - before) <= 0.5 * (fabs(before) + fabs(after));
+    const double scale = fabs(before) + fabs(rigid_body_dual_hamiltonian(&s->params, middle)) + fabs(after);
+    return fabs(after - before) <= 0.5 * scale;
 }
 
 /* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last

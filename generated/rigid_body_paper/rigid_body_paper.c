@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: b72c1be9061586fd22ddb907e51efeeab7a957f51dbba73e0edfe25c8d96cd11
+ * body-sha256: a48b3165595ffac5cb2d357bf8258b79862049e8dc2284915a7e1bcf254d9fe9
  */
 #include "rigid_body_paper.h"
 
@@ -450,20 +450,22 @@ static void rigid_body_paper_remember(rigid_body_paper_memory *memory, const dou
    away, at another energy, that has nothing to do with it. */
 static int rigid_body_paper_plausible(const rigid_body_paper_solver *s, int stage, const double increment[3])
 {
-    double moved = 0.0, size = 0.0, field[3], end[3];
+    double moved = 0.0, size = 0.0, field[3], middle[3], end[3];
     for (int i = 0; i < 3; ++i) {
         moved += fabs(increment[i]);
         size += fabs(s->x[i]);
     }
-    if (moved <= 2.0 * size) return 1;
+    if (moved <= 1.5 * size) return 1;
     rigid_body_paper_vector_field(&s->params, s->x, field);
     for (int i = 0; i < 3; ++i) {
         size += fabs(rigid_body_paper_fractions[stage] * s->h * field[i]);
+        middle[i] = s->x[i] + 0.5 * increment[i];
         end[i] = s->x[i] + increment[i];
     }
-    if (moved <= 2.0 * size) return 1;
+    if (moved <= 1.5 * size) return 1;
     const double before = rigid_body_paper_hamiltonian(&s->params, s->x), after = rigid_body_paper_hamiltonian(&s->params, end);
-    return fabs(after - before) <= 0.5 * (fabs(before) + fabs(after));
+    const double scale = fabs(before) + fabs(rigid_body_paper_hamiltonian(&s->params, middle)) + fabs(after);
+    return fabs(after - before) <= 0.5 * scale;
 }
 
 /* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 7c6e04936f65d6f86c16cafe263b642fa7005949966cbab3c5018582fbc16525
+ * body-sha256: 7ee6004899d01d574815a21bd586c10a7ce76323311032a7870298361867504b
  */
 #include "sir_epidemic.h"
 
@@ -310,20 +310,22 @@ static void sir_epidemic_remember(sir_epidemic_memory *memory, const double valu
    away, at another energy, that has nothing to do with it. */
 static int sir_epidemic_plausible(const sir_epidemic_solver *s, int stage, const double increment[3])
 {
-    double moved = 0.0, size = 0.0, field[3], end[3];
+    double moved = 0.0, size = 0.0, field[3], middle[3], end[3];
     for (int i = 0; i < 3; ++i) {
         moved += fabs(increment[i]);
         size += fabs(s->x[i]);
     }
-    if (moved <= 2.0 * size) return 1;
+    if (moved <= 1.5 * size) return 1;
     sir_epidemic_vector_field(&s->params, s->x, field);
     for (int i = 0; i < 3; ++i) {
         size += fabs(sir_epidemic_fractions[stage] * s->h * field[i]);
+        middle[i] = s->x[i] + 0.5 * increment[i];
         end[i] = s->x[i] + increment[i];
     }
-    if (moved <= 2.0 * size) return 1;
+    if (moved <= 1.5 * size) return 1;
     const double before = sir_epidemic_hamiltonian(&s->params, s->x), after = sir_epidemic_hamiltonian(&s->params, end);
-    return fabs(after - before) <= 0.5 * (fabs(before) + fabs(after));
+    const double scale = fabs(before) + fabs(sir_epidemic_hamiltonian(&s->params, middle)) + fabs(after);
+    return fabs(after - before) <= 0.5 * scale;
 }
 
 /* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last

@@ -12,7 +12,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 9a99bafe2bbe47bec8f272b78127b77865d6083b534c845948a08ff45d2bd237
+ * body-sha256: cd47231dc6d07f8aa82d28aa16724a97f821a59c6bd311407601b4a8bc16906b
  */
 #include "sir_final_size.h"
 
@@ -302,20 +302,22 @@ static void sir_final_size_remember(sir_final_size_memory *memory, const double 
    away, at another energy, that has nothing to do with it. */
 static int sir_final_size_plausible(const sir_final_size_solver *s, int stage, const double increment[3])
 {
-    double moved = 0.0, size = 0.0, field[3], end[3];
+    double moved = 0.0, size = 0.0, field[3], middle[3], end[3];
     for (int i = 0; i < 3; ++i) {
         moved += fabs(increment[i]);
         size += fabs(s->x[i]);
     }
-    if (moved <= 2.0 * size) return 1;
+    if (moved <= 1.5 * size) return 1;
     sir_final_size_vector_field(&s->params, s->x, field);
     for (int i = 0; i < 3; ++i) {
         size += fabs(sir_final_size_fractions[stage] * s->h * field[i]);
+        middle[i] = s->x[i] + 0.5 * increment[i];
         end[i] = s->x[i] + increment[i];
     }
-    if (moved <= 2.0 * size) return 1;
+    if (moved <= 1.5 * size) return 1;
     const double before = sir_final_size_hamiltonian(&s->params, s->x), after = sir_final_size_hamiltonian(&s->params, end);
-    return fabs(after - before) <= 0.5 * (fabs(before) + fabs(after));
+    const double scale = fabs(before) + fabs(sir_final_size_hamiltonian(&s->params, middle)) + fabs(after);
+    return fabs(after - before) <= 0.5 * scale;
 }
 
 /* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last

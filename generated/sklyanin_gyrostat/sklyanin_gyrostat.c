@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 32404e47fc3dcf4e29ebbd75cbeaceede224ce4e9d85906c919bb0286217fcd4
+ * body-sha256: 07125a2c0057430bb584bc810a63af3a1ade6088ffe5f6298ccef23a77208ff5
  */
 #include "sklyanin_gyrostat.h"
 
@@ -406,20 +406,22 @@ static void sklyanin_gyrostat_remember(sklyanin_gyrostat_memory *memory, const d
    away, at another energy, that has nothing to do with it. */
 static int sklyanin_gyrostat_plausible(const sklyanin_gyrostat_solver *s, int stage, const double increment[4])
 {
-    double moved = 0.0, size = 0.0, field[4], end[4];
+    double moved = 0.0, size = 0.0, field[4], middle[4], end[4];
     for (int i = 0; i < 4; ++i) {
         moved += fabs(increment[i]);
         size += fabs(s->x[i]);
     }
-    if (moved <= 2.0 * size) return 1;
+    if (moved <= 1.5 * size) return 1;
     sklyanin_gyrostat_vector_field(&s->params, s->x, field);
     for (int i = 0; i < 4; ++i) {
         size += fabs(sklyanin_gyrostat_fractions[stage] * s->h * field[i]);
+        middle[i] = s->x[i] + 0.5 * increment[i];
         end[i] = s->x[i] + increment[i];
     }
-    if (moved <= 2.0 * size) return 1;
+    if (moved <= 1.5 * size) return 1;
     const double before = sklyanin_gyrostat_hamiltonian(&s->params, s->x), after = sklyanin_gyrostat_hamiltonian(&s->params, end);
-    return fabs(after - before) <= 0.5 * (fabs(before) + fabs(after));
+    const double scale = fabs(before) + fabs(sklyanin_gyrostat_hamiltonian(&s->params, middle)) + fabs(after);
+    return fabs(after - before) <= 0.5 * scale;
 }
 
 /* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last

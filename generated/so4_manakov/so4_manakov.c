@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: f86ec9c02c059f5e243e0697f2d9f348f837fdd45b0890fa6a550fb9fe205329
+ * body-sha256: 5ef55328810f4e4beccd457c3d45795516853da258612668a2b1c968766c3a96
  */
 #include "so4_manakov.h"
 
@@ -915,20 +915,22 @@ static void so4_manakov_remember(so4_manakov_memory *memory, const double value[
    away, at another energy, that has nothing to do with it. */
 static int so4_manakov_plausible(const so4_manakov_solver *s, int stage, const double increment[6])
 {
-    double moved = 0.0, size = 0.0, field[6], end[6];
+    double moved = 0.0, size = 0.0, field[6], middle[6], end[6];
     for (int i = 0; i < 6; ++i) {
         moved += fabs(increment[i]);
         size += fabs(s->x[i]);
     }
-    if (moved <= 2.0 * size) return 1;
+    if (moved <= 1.5 * size) return 1;
     so4_manakov_vector_field(&s->params, s->x, field);
     for (int i = 0; i < 6; ++i) {
         size += fabs(so4_manakov_fractions[stage] * s->h * field[i]);
+        middle[i] = s->x[i] + 0.5 * increment[i];
         end[i] = s->x[i] + increment[i];
     }
-    if (moved <= 2.0 * size) return 1;
+    if (moved <= 1.5 * size) return 1;
     const double before = so4_manakov_hamiltonian(&s->params, s->x), after = so4_manakov_hamiltonian(&s->params, end);
-    return fabs(after - before) <= 0.5 * (fabs(before) + fabs(after));
+    const double scale = fabs(before) + fabs(so4_manakov_hamiltonian(&s->params, middle)) + fabs(after);
+    return fabs(after - before) <= 0.5 * scale;
 }
 
 /* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last

@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: ddbf503fd8f6c7f7863459fbf5427ff3aabdf6053c82b895b7e1929171481ddd
+ * body-sha256: 68eb1f295b5a2b843893cf3ae02deb8bdb7aa80796212788b95ab532a7660ce7
  */
 #include "spin_chain5.h"
 
@@ -1893,20 +1893,22 @@ static void spin_chain5_remember(spin_chain5_memory *memory, const double value[
    away, at another energy, that has nothing to do with it. */
 static int spin_chain5_plausible(const spin_chain5_solver *s, int stage, const double increment[15])
 {
-    double moved = 0.0, size = 0.0, field[15], end[15];
+    double moved = 0.0, size = 0.0, field[15], middle[15], end[15];
     for (int i = 0; i < 15; ++i) {
         moved += fabs(increment[i]);
         size += fabs(s->x[i]);
     }
-    if (moved <= 2.0 * size) return 1;
+    if (moved <= 1.5 * size) return 1;
     spin_chain5_vector_field(&s->params, s->x, field);
     for (int i = 0; i < 15; ++i) {
         size += fabs(spin_chain5_fractions[stage] * s->h * field[i]);
+        middle[i] = s->x[i] + 0.5 * increment[i];
         end[i] = s->x[i] + increment[i];
     }
-    if (moved <= 2.0 * size) return 1;
+    if (moved <= 1.5 * size) return 1;
     const double before = spin_chain5_hamiltonian(&s->params, s->x), after = spin_chain5_hamiltonian(&s->params, end);
-    return fabs(after - before) <= 0.5 * (fabs(before) + fabs(after));
+    const double scale = fabs(before) + fabs(spin_chain5_hamiltonian(&s->params, middle)) + fabs(after);
+    return fabs(after - before) <= 0.5 * scale;
 }
 
 /* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last

@@ -13,7 +13,7 @@
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 10d06e347e584bd80476431bc23bbccff5f0717fe595a1708c8983b7e910cdd4
+# body-sha256: 56f647c10d1e78b9a141e01c22c5250c91b0b9bffce6fe48c84a1504b52878fd
 import numpy as np
 
 VERSION = "0.1.0"
@@ -1549,6 +1549,30 @@ def _solve(matrix, side):
         return np.concatenate([_solve(matrix[m : m + 1], side[m : m + 1]) for m in range(len(side))])
 
 
+def _plausible(stage, x, end):
+    """Whether steps lead where the motion does; arrays (members, DIM).
+
+    Where the step is too large, the equation may have been solved by a point far away, at another energy, that has
+    nothing to do with it.
+    """
+    _, parameters, h = stage
+    moved, size = np.abs(end - x).sum(axis=-1), np.abs(x).sum(axis=-1)
+    near = moved <= 1.5 * size
+    if near.all():
+        return near
+    size = size + np.abs(h * _vector_field(parameters, x)).sum(axis=-1)
+    before, middle, after = (_energy(parameters, at)[:, 0] for at in (x, 0.5 * (x + end), end))
+    kept = np.abs(after - before) <= 0.5 * (np.abs(before) + np.abs(middle) + np.abs(after))
+    return (moved <= 1.5 * size) | kept
+
+
+def _solved(stage, x, carry, guess):
+    """What _attempt finds, with a status for what is not plausible."""
+    following, rest, value, status = _attempt(stage[0], x, carry, guess)
+    status[(status == "") & ~_plausible(stage, x, following)] = "NO_CONVERGENCE"
+    return following, rest, value, status
+
+
 def _size(y, delta):
     """Size of a correction relative to each component of y, but no finer than 1e-6 of the largest."""
     scale = np.abs(y) + 1e-6 * np.max(np.abs(y), axis=-1, keepdims=True) + np.finfo(float).tiny
@@ -1590,14 +1614,14 @@ def _attempt(coef, x, carry, y):
     return x, carry, y, status
 
 
-def _advance(coef, x, carry, memory):
+def _advance(stage, x, carry, memory):
     """One stage of all members; `memory` holds the offsets y - x of the last two steps, for the starting guess."""
     guess = x + (2 * memory[0] - memory[1])
-    following, rest, y, status = _attempt(coef, x, carry, guess)
+    following, rest, y, status = _solved(stage, x, carry, guess)
     failed = np.flatnonzero(status != "")
     if len(failed) and memory[0].any():
         # A guess from earlier steps may mislead: once more from y = x.
-        again = _attempt(_at(coef, failed), x[failed], carry[failed], x[failed])
+        again = _solved((_at(stage[0], failed), *stage[1:]), x[failed], carry[failed], x[failed])
         following[failed], rest[failed], y[failed], status[failed] = again
     return following, rest, (y - x, memory[0] if memory[0].any() else y - x), status
 
@@ -2118,22 +2142,26 @@ def _products(parameters, x):
         ])
 
 
+def _coefficients(parameters, x, h, gauge):
+    """What does not depend on the state, for each stage: coefficients, parameters and the step of the stage.
+
+    The coefficients are arrays (coefficients, members), or (coefficients, 1).
+    """
+    stages = [fraction * h for fraction in FRACTIONS]
+    if not GAUGE:
+        return [(np.array(_prepare(parameters, step)).reshape(-1, 1), parameters, step) for step in stages]
+    chosen = _choose_gauge(parameters, x) if gauge is None else np.broadcast_to(gauge, (len(x), len(GAUGE)))
+    return [
+        (np.array([c + np.zeros(len(x)) for c in _prepare(parameters, chosen.T, step)]), parameters, step)
+        for step in stages
+    ]
+
+
 def gauge(x, **parameters):
     """The multiples of the Casimirs in GAUGE that integrate() chooses for trajectories from x: (..., len(GAUGE))."""
     x = np.asarray(x, dtype=float)
     with np.errstate(all="ignore"):
         return _choose_gauge(_values(parameters), x.reshape(-1, DIM)).reshape(x.shape[:-1] + (len(GAUGE),))
-
-
-def _coefficients(parameters, x, h, gauge):
-    """What does not depend on the state, for each stage: arrays (coefficients, members), or (coefficients, 1)."""
-    if not GAUGE:
-        return [np.array(_prepare(parameters, fraction * h)).reshape(-1, 1) for fraction in FRACTIONS]
-    chosen = _choose_gauge(parameters, x) if gauge is None else np.broadcast_to(gauge, (len(x), len(GAUGE)))
-    return [
-        np.array([c + np.zeros(len(x)) for c in _prepare(parameters, chosen.T, fraction * h)])
-        for fraction in FRACTIONS
-    ]
 
 
 def step(x, h, gauge=None, **parameters):
@@ -2161,11 +2189,11 @@ def integrate(x0, h, steps, stride=1, gauge=None, **parameters):
     memory = [(carry, carry)] * len(FRACTIONS)
     rows = [x]
     with np.errstate(all="ignore"):
-        coef = _coefficients(_values(parameters), x, float(h), gauge)
+        stages = _coefficients(_values(parameters), x, float(h), gauge)
         for done in range(steps):
             following = x
-            for stage in range(len(FRACTIONS)):
-                following, carry, memory[stage], status = _advance(coef[stage], following, carry, memory[stage])
+            for k, stage in enumerate(stages):
+                following, carry, memory[k], status = _advance(stage, following, carry, memory[k])
                 if (status != "").any():
                     break
             failed = np.flatnonzero(status != "")

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: fd34e6350a7fff0819fe316f4bd769bbe54c6b5aa913d7ea8055a08759d4afb7
+ * body-sha256: 2516e8fe25f6edfc1dbedd5899613bc22cfb4b155549a4acc347fa6725651bab
  */
 #include "toda3.h"
 
@@ -525,20 +525,22 @@ static void toda3_remember(toda3_memory *memory, const double value[5], int iter
    away, at another energy, that has nothing to do with it. */
 static int toda3_plausible(const toda3_solver *s, int stage, const double increment[5])
 {
-    double moved = 0.0, size = 0.0, field[5], end[5];
+    double moved = 0.0, size = 0.0, field[5], middle[5], end[5];
     for (int i = 0; i < 5; ++i) {
         moved += fabs(increment[i]);
         size += fabs(s->x[i]);
     }
-    if (moved <= 2.0 * size) return 1;
+    if (moved <= 1.5 * size) return 1;
     toda3_vector_field(&s->params, s->x, field);
     for (int i = 0; i < 5; ++i) {
         size += fabs(toda3_fractions[stage] * s->h * field[i]);
+        middle[i] = s->x[i] + 0.5 * increment[i];
         end[i] = s->x[i] + increment[i];
     }
-    if (moved <= 2.0 * size) return 1;
+    if (moved <= 1.5 * size) return 1;
     const double before = toda3_hamiltonian(&s->params, s->x), after = toda3_hamiltonian(&s->params, end);
-    return fabs(after - before) <= 0.5 * (fabs(before) + fabs(after));
+    const double scale = fabs(before) + fabs(toda3_hamiltonian(&s->params, middle)) + fabs(after);
+    return fabs(after - before) <= 0.5 * scale;
 }
 
 /* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last

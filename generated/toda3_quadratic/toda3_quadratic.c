@@ -12,7 +12,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 31c85b30a1132196c92a6d4803941b1487973cc768316f5723c65173a852958b
+ * body-sha256: f82204e230beebe12d2ed35586782ad0ccd010afe9369e3f5bb1dfbfc7caa3bd
  */
 #include "toda3_quadratic.h"
 
@@ -284,20 +284,22 @@ static void toda3_quadratic_remember(toda3_quadratic_memory *memory, const doubl
    away, at another energy, that has nothing to do with it. */
 static int toda3_quadratic_plausible(const toda3_quadratic_solver *s, int stage, const double increment[5])
 {
-    double moved = 0.0, size = 0.0, field[5], end[5];
+    double moved = 0.0, size = 0.0, field[5], middle[5], end[5];
     for (int i = 0; i < 5; ++i) {
         moved += fabs(increment[i]);
         size += fabs(s->x[i]);
     }
-    if (moved <= 2.0 * size) return 1;
+    if (moved <= 1.5 * size) return 1;
     toda3_quadratic_vector_field(&s->params, s->x, field);
     for (int i = 0; i < 5; ++i) {
         size += fabs(toda3_quadratic_fractions[stage] * s->h * field[i]);
+        middle[i] = s->x[i] + 0.5 * increment[i];
         end[i] = s->x[i] + increment[i];
     }
-    if (moved <= 2.0 * size) return 1;
+    if (moved <= 1.5 * size) return 1;
     const double before = toda3_quadratic_hamiltonian(&s->params, s->x), after = toda3_quadratic_hamiltonian(&s->params, end);
-    return fabs(after - before) <= 0.5 * (fabs(before) + fabs(after));
+    const double scale = fabs(before) + fabs(toda3_quadratic_hamiltonian(&s->params, middle)) + fabs(after);
+    return fabs(after - before) <= 0.5 * scale;
 }
 
 /* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last

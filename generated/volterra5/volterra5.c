@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 2ef10095039600d1c403cebb089ae51da7d22246deabefaac81a4123fb941202
+ * body-sha256: a6c803fe99e8201cae53a76916581a81bf146f114c56e80e2554bceafa25784a
  */
 #include "volterra5.h"
 
@@ -436,20 +436,22 @@ static void volterra5_remember(volterra5_memory *memory, const double value[5], 
    away, at another energy, that has nothing to do with it. */
 static int volterra5_plausible(const volterra5_solver *s, int stage, const double increment[5])
 {
-    double moved = 0.0, size = 0.0, field[5], end[5];
+    double moved = 0.0, size = 0.0, field[5], middle[5], end[5];
     for (int i = 0; i < 5; ++i) {
         moved += fabs(increment[i]);
         size += fabs(s->x[i]);
     }
-    if (moved <= 2.0 * size) return 1;
+    if (moved <= 1.5 * size) return 1;
     volterra5_vector_field(&s->params, s->x, field);
     for (int i = 0; i < 5; ++i) {
         size += fabs(volterra5_fractions[stage] * s->h * field[i]);
+        middle[i] = s->x[i] + 0.5 * increment[i];
         end[i] = s->x[i] + increment[i];
     }
-    if (moved <= 2.0 * size) return 1;
+    if (moved <= 1.5 * size) return 1;
     const double before = volterra5_hamiltonian(&s->params, s->x), after = volterra5_hamiltonian(&s->params, end);
-    return fabs(after - before) <= 0.5 * (fabs(before) + fabs(after));
+    const double scale = fabs(before) + fabs(volterra5_hamiltonian(&s->params, middle)) + fabs(after);
+    return fabs(after - before) <= 0.5 * scale;
 }
 
 /* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last

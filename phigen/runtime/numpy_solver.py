@@ -18,6 +18,8 @@ import numpy as np
 from phigen.runtime.interface import BackendError, Floats, Interface, MissingExtraError
 
 Pair = tuple[Floats, Floats]
+#: Coefficients, parameters and step of a stage, passed on to the module.
+Stage = tuple[Floats, Mapping[str, float], float]
 
 
 def load_module(source: str, name: str) -> ModuleType:
@@ -41,7 +43,7 @@ class NumpySession:
         self._module, self._parameters, self._gauge = module, parameters, gauge
         self._x, self._carry = x, carry
         self._h = np.nan
-        self._coef: list[Floats] = []
+        self._stages: list[Stage] = []
         self._memory: list[Pair] = []
 
     def state(self) -> Floats:
@@ -74,7 +76,7 @@ class NumpySession:
     def branch(self) -> NumpySession:
         """See `Session`."""
         twin = NumpySession(self._module, self._parameters, self._x, self._carry, self._gauge)
-        twin.steps, twin._h, twin._coef, twin._memory = self.steps, self._h, self._coef, list(self._memory)
+        twin.steps, twin._h, twin._stages, twin._memory = self.steps, self._h, self._stages, list(self._memory)
         return twin
 
     def saved(self) -> bytes:
@@ -101,16 +103,16 @@ class NumpySession:
         if h != self._h:
             values = self._module._values(dict(self._parameters))
             with np.errstate(all="ignore"):
-                self._coef = self._module._coefficients(values, self._x, h, self._gauge)
-            self._memory = [(np.zeros_like(self._x),) * 2] * len(self._coef)
+                self._stages = self._module._coefficients(values, self._x, h, self._gauge)
+            self._memory = [(np.zeros_like(self._x),) * 2] * len(self._stages)
             self._h = h
 
-    def _tried(self) -> tuple[Floats, Floats, list[Pair], list[tuple[Floats, Floats, Floats, Floats]]]:
-        """State, carry and memory after one step, and of each stage: coefficients, start and what it solved for."""
+    def _tried(self) -> tuple[Floats, Floats, list[Pair], list[tuple[Stage, Floats, Floats, Floats]]]:
+        """State, carry and memory after one step, and of each stage: itself, its start and what it solved for."""
         x, carry, memory, stages = self._x, self._carry, list(self._memory), []
-        for k, coef in enumerate(self._coef):
-            before = coef, x, carry
-            x, carry, memory[k], status = self._module._advance(coef, x, carry, memory[k])
+        for k, stage in enumerate(self._stages):
+            before = stage, x, carry
+            x, carry, memory[k], status = self._module._advance(stage, x, carry, memory[k])
             if status[0] != "":
                 raise BackendError(str(status[0]), self.steps, self._x.copy())
             stages.append((*before, memory[k][0]))

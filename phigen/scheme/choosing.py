@@ -22,8 +22,10 @@ from phigen.splitting.flow import Flow
 from phigen.splitting.kicks import Kick, kicks
 from phigen.splitting.parts import Splitting
 
-#: Operations of one addition in compensated arithmetic, for each coordinate that a flow moves.
-ADDITION = 7
+#: Operations that a flow costs beside its formulas, for each coordinate that it moves: mostly it waits for the flow
+#: before. Found by timing: of fourteen pairs of methods on seven systems the faster is taken in twelve, and in the
+#: other two one that takes no more than 1.34 times as long.
+OVERHEAD = 12
 
 
 @dataclass(frozen=True)
@@ -102,7 +104,7 @@ def _price(splitting: Splitting, method: Nystrom, kick: Kick) -> float:
 
 
 def _cost(flow: Flow) -> int:
-    return cost(flow.increment) + ADDITION * flow.moving
+    return cost(flow.increment) + OVERHEAD * flow.moving
 
 
 def _arranged(splitting: Splitting, method: Nystrom, kick: Kick) -> Splitting:

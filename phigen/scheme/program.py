@@ -47,6 +47,10 @@ class Kernel:
         return [v for o in self.outputs for v in o.values]
 
 
+#: How far an implicit step may lead, in sizes of the state and of what the vector field says, if the energy is lost.
+PLAUSIBLE = 1.5
+
+
 @dataclass(frozen=True)
 class Program:
     """A solver, ready to be printed. ``driver`` is ``newton``, ``explicit``, ``path`` or ``splitting``.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from phigen.scheme.program import Program
+from phigen.scheme.program import PLAUSIBLE, Program
 from phigen.targets import special
 from phigen.targets.c import extras, lanes, packs, small, splitting
 from phigen.targets.c.kernels import LANES, apart, function, members, printer, wrapped_arguments
@@ -35,9 +35,6 @@ GROUP_REPAY = 200
 
 #: How far from the last value a guess may be, in sizes of that value.
 REACH = 4.0
-
-#: How far a step may lead, in sizes of the state and of what the vector field says.
-PLAUSIBLE = 2.0
 
 #: Values that the history of a solver may hold in all.
 MOST_HISTORY = 8_000

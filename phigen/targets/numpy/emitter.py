@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from phigen.scheme.alternation import Schedule
-from phigen.scheme.program import Kernel, Program
+from phigen.scheme.program import PLAUSIBLE, Kernel, Program
 from phigen.symbolic.entire import ENTIRE
 from phigen.symbolic.expression import Expression
 from phigen.symbolic.special import SPECIAL
@@ -67,7 +67,7 @@ def emit(program: Program, command: str) -> dict[str, str]:
     gauge = ("gauge_line.py", "gauge.py") if program.gauge else ("no_gauge.py",)
     pieces += [render("numpy", template, _values(program)) for template in gauge]
     pieces += [_function(program, kernels[k]) for k in ("guide", "products") if k in kernels]
-    pieces += [render("numpy", "api.py", _values(program))]
+    pieces += [render("numpy", part, _values(program)) for part in ("coefficients.py", "api.py")]
     pieces += [_function(program, kernels[k]) for k in ("energy", "casimirs", "vector_field")]
     pieces += [render("numpy", "observables.py", _values(program))]
     if program.extras.tangent:
@@ -94,11 +94,11 @@ def _driver(program: Program) -> list[str]:
         return [prepare, _function(program, kernels["explicit"]), render("numpy", "explicit.py", values)]
     if program.path:
         path = values | statements(program, program.path, PATH_SYNTAX)
-        parts = ("holds", "piece", "path", "residual", "solve", "path_step")
+        parts = ("holds", "piece", "path", "residual", "solve", "plausible", "path_step")
         generate = _function(program, kernels["generate"])
         return [prepare, generate, *(render("numpy", f"{part}.py", path) for part in parts)]
     linearise = _function(program, kernels["linearise"])
-    return [prepare, linearise, render("numpy", "solve.py", values), render("numpy", "newton.py", values)]
+    return [prepare, linearise, *(render("numpy", f"{part}.py", values) for part in ("solve", "plausible", "newton"))]
 
 
 def _splitting_values(program: Program, schedule: Schedule) -> dict[str, object]:
@@ -143,6 +143,7 @@ def _values(program: Program) -> dict[str, object]:
         "casimirs": _strings(program.casimirs),
         "defaults": [f'"{p.name}": {float(p.value)!r}' for p in program.parameters],
         "gauge": _strings(program.gauge),
+        "plausible": repr(PLAUSIBLE),
         "fractions": "(" + "".join(f"{f!r}, " for f in program.fractions).rstrip() + ")",
         "terms": TERMS,
         "series": len(program.path.series) if program.path else 0,
