@@ -23,7 +23,8 @@ from phigen.spec.model import Extras, Spec
 from phigen.spec.names import IDENTIFIER, KEYWORDS, SCHEMES, SPEC_NAME
 
 if TYPE_CHECKING:
-    from phigen.runtime.interface import Backend, Interface
+    from phigen.runtime.backend import Backend
+    from phigen.runtime.interface import Interface
     from phigen.runtime.solver import Solver
     from phigen.scheme.program import Program
 

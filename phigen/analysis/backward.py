@@ -160,3 +160,8 @@ def constancy(found: Modified, method: Method, x: Floats, h: float) -> Constancy
     times: Floats = shown * np.arange(len(rows), dtype=np.float64)
     observed = tuple(observed_powers(found, method, x, h))
     return Constancy(found.powers, observed, shown, times, found.errors(rows, shown), STEPS * largest, sizes, changes)
+
+
+def truncation(m: int) -> str:
+    """H̃ with m corrections, in words."""
+    return "H itself" if m == 0 else f"H̃ with {m} correction{'s' * (m > 1)}"

@@ -50,7 +50,7 @@ def poisson_matrix(form: PoissonForm, coordinates: Sequence[str], algebra: LieAl
         case ProductForm(blocks):
             return _product(coordinates, blocks)
         case PullbackForm():
-            return pulled_back(form, coordinates)
+            return pulled_back(form, poisson_matrix(form.of, form.coordinates), coordinates)
         case LieAlgebraForm():
             algebra = algebra or algebra_of_form(form, coordinates)
             assert algebra is not None

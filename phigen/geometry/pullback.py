@@ -52,12 +52,9 @@ def change_of_coordinates(form: PullbackForm, coordinates: Sequence[str]) -> Coo
     return Coordinates(form.map, backward, inverse_matrix([list(row) for row in zip(*columns, strict=True)]))
 
 
-def pulled_back(form: PullbackForm, coordinates: Sequence[str]) -> Matrix:
-    """π_ij = Σ ∂x_i/∂y_a {y_a, y_b} ∂x_j/∂y_b as a function of x."""
-    from phigen.geometry.forms import poisson_matrix  # forms may be nested
-
+def pulled_back(form: PullbackForm, inner: Matrix, coordinates: Sequence[str]) -> Matrix:
+    """π_ij = Σ ∂x_i/∂y_a {y_a, y_b} ∂x_j/∂y_b as a function of x; ``inner`` is the matrix {y_a, y_b} of ``form.of``."""
     change = change_of_coordinates(form, coordinates)
-    inner = poisson_matrix(form.of, form.coordinates)
     foreign = [s for s in symbols_of(*(e for row in inner for e in row)) if s in coordinates]
     if foreign:
         raise SpecError(

@@ -67,7 +67,7 @@ def _gauged(system: System, choice: BirealisationChoice) -> BiRealisation:
 
 
 def _pulled_back(system: System, choice: BirealisationChoice) -> BiRealisation | None:
-    return pullback.pulled_back(system, build, choice) if isinstance(system.form, PullbackForm) else None
+    return pullback.build(system, choice, build) if isinstance(system.form, PullbackForm) else None
 
 
 def _by_blocks(system: System, choice: BirealisationChoice) -> BiRealisation | None:

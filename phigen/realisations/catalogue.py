@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
+
 from phigen.errors import Diagnostic, SpecError
 from phigen.geometry.system import System
 from phigen.realisations import (
@@ -22,23 +25,30 @@ from phigen.realisations import (
 from phigen.realisations.protocol import BiRealisation, Builder
 from phigen.spec.model import BirealisationChoice
 
+
+def _of_parts(build: Callable[[System, BirealisationChoice, Builder], BiRealisation]) -> Builder:
+    """The builder of a kind that is made of others: of the kind ``choice.of``, which is auto unless it is given."""
+
+    def built(system: System, choice: BirealisationChoice) -> BiRealisation:
+        return build(system, replace(choice, kind=choice.of, of="auto"), builder(choice.of))
+
+    return built
+
+
 BUILDERS: dict[str, Builder] = {
-    module.KIND: module.build
-    for module in (
-        auto,
-        constant,
-        canonical_euler,
-        log_canonical,
-        gauged,
-        exponential,
-        cayley,
-        group_map,
-        product,
-        pullback,
-        karasev,
-        spray,
-        custom,
-    )
+    auto.KIND: auto.build,
+    constant.KIND: constant.build,
+    canonical_euler.KIND: canonical_euler.build,
+    log_canonical.KIND: log_canonical.build,
+    gauged.KIND: gauged.build,
+    exponential.KIND: exponential.build,
+    cayley.KIND: cayley.build,
+    group_map.KIND: group_map.build,
+    product.KIND: _of_parts(product.build),
+    pullback.KIND: _of_parts(pullback.build),
+    karasev.KIND: karasev.build,
+    spray.KIND: spray.build,
+    custom.KIND: custom.build,
 }
 
 

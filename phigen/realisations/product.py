@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 from phigen.geometry.blocks import blocks
 from phigen.geometry.parts import block_of
@@ -16,20 +15,18 @@ from phigen.symbolic.expression import ZERO, Expression
 KIND = "product"
 
 
-def build(system: System, choice: BirealisationChoice) -> BiRealisation:
-    """The product over the blocks of π, each by the kind ``choice.of`` (default: auto).
+def build(system: System, choice: BirealisationChoice, build_part: Builder) -> BiRealisation:
+    """The product over the blocks of π of the bi-realisations that ``build_part`` makes.
 
     Raises `SpecError` if π has one block only, if a block does not allow the kind, or if the solver of a block
     would have to follow paths: that is done for the whole system or not at all.
     """
-    from phigen.realisations.catalogue import builder
-
     parts = grouped(system)
     if len(parts) < 2:
         raise refuse(
             f"birealisation {KIND} needs a block-diagonal π; here {', '.join(system.coordinates)} are one block"
         )
-    return assembled(system, parts, builder(choice.of), replace(choice, kind=choice.of, of="auto"))
+    return assembled(system, parts, build_part, choice)
 
 
 def grouped(system: System) -> list[System]:

@@ -6,11 +6,10 @@ With q_a = Σ_i p_i ∂x_i/∂y_a, the covector in the coordinates y, α(x, p) =
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
+from phigen.geometry.forms import poisson_matrix
 from phigen.geometry.parts import part
 from phigen.geometry.pullback import Coordinates, change_of_coordinates
-from phigen.geometry.pullback import pulled_back as matrix_of_pullback
 from phigen.geometry.system import System
 from phigen.realisations.protocol import (
     BiRealisation,
@@ -27,19 +26,12 @@ from phigen.symbolic.expression import Expression, substitute, symbol, total
 KIND = "pullback"
 
 
-def build(system: System, choice: BirealisationChoice) -> BiRealisation:
-    """The bi-realisation of the inner structure, by the kind ``choice.of`` (default: auto), in the spec's coordinates.
+def build(system: System, choice: BirealisationChoice, build_inner: Builder) -> BiRealisation:
+    """The bi-realisation of the inner structure, made by ``build_inner``, in the spec's coordinates.
 
     Raises `SpecError` unless the form of π is a pull-back, and if the solver of the inner structure would have
     to follow paths.
     """
-    from phigen.realisations.catalogue import builder
-
-    return pulled_back(system, builder(choice.of), replace(choice, kind=choice.of, of="auto"))
-
-
-def pulled_back(system: System, build_inner: Builder, choice: BirealisationChoice) -> BiRealisation:
-    """The pull-back of the bi-realisation that ``build_inner`` makes."""
     form = system.form
     if not isinstance(form, PullbackForm):
         raise refuse(f"birealisation {KIND} needs poisson: {{pullback: …}}")
@@ -73,7 +65,7 @@ def is_composed(system: System, realisation: BiRealisation) -> bool:
         return False
     change = change_of_coordinates(system.form, system.coordinates)
     structure, inner = realisation.inner
-    if structure.form is not system.form.of or system.poisson != matrix_of_pullback(system.form, system.coordinates):
+    if structure.form is not system.form.of or system.poisson != poisson_matrix(system.form, system.coordinates):
         return False
     pairs = ((realisation.alpha, inner.alpha), (realisation.beta, inner.beta))
     return all(outer == moved(system, system.form, change, maps) for outer, maps in pairs)

@@ -6,7 +6,7 @@ from math import isfinite
 
 from markupsafe import Markup
 
-from phigen.analysis.backward import Constancy
+from phigen.analysis.backward import Constancy, truncation
 from phigen.report import page
 from phigen.report.drawable import drawable
 
@@ -31,14 +31,9 @@ def modified_section(found: Constancy | None, why_not: str) -> Markup:
     return page.joined(blocks)
 
 
-def label(m: int) -> str:
-    """The truncation with m corrections, for people."""
-    return "H itself" if m == 0 else f"H̃ with {m} correction{'s' * (m > 1)}"
-
-
 def _row(m: int, found: Constancy) -> tuple[str, list[page.Cell]]:
     observed = (
         Markup("h<sup>{}</sup>").format(f"{found.observed[m]:.2f}") if isfinite(found.observed[m]) else "rounding"
     )
     stated = Markup("h<sup>{}</sup>").format(found.powers[m])
-    return label(m), [("", stated), ("", observed), ("number", page.scientific(float(found.errors[m].max())))]
+    return truncation(m), [("", stated), ("", observed), ("number", page.scientific(float(found.errors[m].max())))]

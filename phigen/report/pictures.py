@@ -10,14 +10,13 @@ from markupsafe import Markup
 
 from phigen.analysis import figures
 from phigen.analysis.arrays import Floats
-from phigen.analysis.backward import Constancy
+from phigen.analysis.backward import Constancy, truncation
 from phigen.analysis.lyapunov import Spectrum
 from phigen.analysis.precision import Study
 from phigen.analysis.summary import Summary
 from phigen.compiler import Compilation
 from phigen.report import page
 from phigen.report.material import Material
-from phigen.report.modified import label
 from phigen.report.svg import inlined
 from phigen.runtime.trajectory import Trajectory
 
@@ -62,7 +61,7 @@ def section_picture(names: Sequence[str], function: str, points: Floats, count: 
 
 def constancy_picture(found: Constancy) -> Markup:
     """How constant the modified Hamiltonian is."""
-    largest = page.listed({label(m): float(e.max()) for m, e in enumerate(found.errors)})
+    largest = page.listed({truncation(m): float(e.max()) for m, e in enumerate(found.errors)})
     caption = "Changes of H and of H̃ with one and two corrections, relative to the energy. Thin lines have the slopes "
     caption += "that they should have. The dotted line is one unit in the last place of a double."
     figure, said = figures.constancy_figure(found), f"Largest changes at steps of {found.step:.4g}: {largest}."

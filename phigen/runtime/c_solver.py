@@ -109,7 +109,7 @@ class CSolver:
             setattr(self._c, name, function)
 
     def with_gauge(self, gauge: Floats) -> CSolver:
-        """See `phigen.runtime.interface.Backend`."""
+        """See `phigen.runtime.backend.Backend`."""
         return CSolver(self._library, self.interface, np.ascontiguousarray(gauge, dtype=np.float64))
 
     @classmethod
@@ -119,11 +119,11 @@ class CSolver:
 
     @property
     def identity(self) -> str:
-        """See `phigen.runtime.interface.Backend`."""
+        """See `phigen.runtime.backend.Backend`."""
         return cache.key_of(self._library)
 
     def start(self, x0: Floats, parameters: Mapping[str, float]) -> CSession:
-        """See `phigen.runtime.interface.Backend`."""
+        """See `phigen.runtime.backend.Backend`."""
         session = CSession(self._c, _aligned(self._c.solver_size()), self.interface.dimension)
         packed, first = self._packed(parameters), np.ascontiguousarray(x0, dtype=np.float64)
         if self._gauge is None:
@@ -136,13 +136,13 @@ class CSolver:
         return session
 
     def restored(self, saved: bytes, parameters: Mapping[str, float]) -> CSession:
-        """See `phigen.runtime.interface.Backend`; the parameters are part of the bytes."""
+        """See `phigen.runtime.backend.Backend`; the parameters are part of the bytes."""
         if len(saved) != self._c.solver_size():
             raise ValueError(f"{len(saved)} bytes are no {self.interface.name}_solver of this library")
         return CSession(self._c, _aligned_copy(np.frombuffer(saved, dtype=np.uint8)), self.interface.dimension)
 
     def ensemble(self, x0: Floats, h: float, steps: int, parameters: Mapping[str, float]) -> Floats:
-        """See `phigen.runtime.interface.Backend`."""
+        """See `phigen.runtime.backend.Backend`."""
         packed = self._packed(parameters)
         final, status = np.empty_like(x0, order="C"), np.zeros(len(x0), dtype=np.uint8)
         overall = 0
@@ -162,17 +162,17 @@ class CSolver:
         return final
 
     def hamiltonian(self, x: Floats, parameters: Mapping[str, float]) -> Floats:
-        """See `phigen.runtime.interface.Backend`."""
+        """See `phigen.runtime.backend.Backend`."""
         packed, x = self._packed(parameters), np.ascontiguousarray(x)
         return np.array([self._c.hamiltonian(packed.ctypes.data, row) for row in _addresses(x)], dtype=np.float64)
 
     def casimirs(self, x: Floats, parameters: Mapping[str, float]) -> Floats:
-        """See `phigen.runtime.interface.Backend`."""
+        """See `phigen.runtime.backend.Backend`."""
         out = np.empty((len(x), len(self.interface.casimirs)))
         return self._fill(self._c.casimirs, x, out, parameters) if self.interface.casimirs else out
 
     def vector_field(self, x: Floats, parameters: Mapping[str, float]) -> Floats:
-        """See `phigen.runtime.interface.Backend`."""
+        """See `phigen.runtime.backend.Backend`."""
         return self._fill(self._c.vector_field, x, np.empty_like(x, order="C"), parameters)
 
     def _fill(self, function: Any, x: Floats, out: Floats, parameters: Mapping[str, float]) -> Floats:

@@ -134,7 +134,7 @@ class NumpySolver:
         self._options = {} if gauge is None else {"gauge": gauge}
 
     def with_gauge(self, gauge: Floats) -> NumpySolver:
-        """See `phigen.runtime.interface.Backend`."""
+        """See `phigen.runtime.backend.Backend`."""
         return NumpySolver(self.module, self.interface, gauge)
 
     @classmethod
@@ -144,11 +144,11 @@ class NumpySolver:
 
     @property
     def identity(self) -> str:
-        """See `phigen.runtime.interface.Backend`."""
+        """See `phigen.runtime.backend.Backend`."""
         return str(self.module.__file__)
 
     def start(self, x0: Floats, parameters: Mapping[str, float]) -> NumpySession:
-        """See `phigen.runtime.interface.Backend`."""
+        """See `phigen.runtime.backend.Backend`."""
         x = x0[np.newaxis].copy()
         gauge = self._options.get("gauge")
         if gauge is None and self.module.GAUGE:
@@ -156,11 +156,11 @@ class NumpySolver:
         return NumpySession(self.module, parameters, x, np.zeros_like(x), gauge)
 
     def restored(self, saved: bytes, parameters: Mapping[str, float]) -> NumpySession:
-        """See `phigen.runtime.interface.Backend`."""
+        """See `phigen.runtime.backend.Backend`."""
         return NumpySession.from_bytes(self.module, parameters, saved)
 
     def ensemble(self, x0: Floats, h: float, steps: int, parameters: Mapping[str, float]) -> Floats:
-        """See `phigen.runtime.interface.Backend`. Where members fail, the others go on without them."""
+        """See `phigen.runtime.backend.Backend`. Where members fail, the others go on without them."""
         x, remaining, gauge = x0.copy(), np.arange(len(x0)), self._gauges(x0, parameters)
         failures: dict[int, str] = {}
         done, first = 0, -1
@@ -191,13 +191,13 @@ class NumpySolver:
         return np.broadcast_to(chosen, (len(x0), len(self.module.GAUGE)))
 
     def hamiltonian(self, x: Floats, parameters: Mapping[str, float]) -> Floats:
-        """See `phigen.runtime.interface.Backend`."""
+        """See `phigen.runtime.backend.Backend`."""
         return np.asarray(self.module.hamiltonian(x, **parameters), dtype=np.float64)
 
     def casimirs(self, x: Floats, parameters: Mapping[str, float]) -> Floats:
-        """See `phigen.runtime.interface.Backend`."""
+        """See `phigen.runtime.backend.Backend`."""
         return np.asarray(self.module.casimirs(x, **parameters), dtype=np.float64)
 
     def vector_field(self, x: Floats, parameters: Mapping[str, float]) -> Floats:
-        """See `phigen.runtime.interface.Backend`."""
+        """See `phigen.runtime.backend.Backend`."""
         return np.asarray(self.module.vector_field(x, **parameters), dtype=np.float64)

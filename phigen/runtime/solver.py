@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from phigen.errors import StepError
+from phigen.runtime.backend import Backend
 from phigen.runtime.crossings import CrossingFinder, Function, Section
-from phigen.runtime.interface import Backend, BackendError, Floats, Interface, MissingExtraError, Progress, row_steps
+from phigen.runtime.interface import BackendError, Floats, Interface, MissingExtraError, Progress, row_steps
 from phigen.runtime.session import Session, rows_along
 from phigen.runtime.trajectory import Trajectory
 

@@ -22,7 +22,8 @@ from phigen.compiler import Compilation, compile_spec, emit
 from phigen.errors import PhigenError, SpecError
 from phigen.geometry.system import System
 from phigen.runtime import cache
-from phigen.runtime.interface import Backend, Interface
+from phigen.runtime.backend import Backend
+from phigen.runtime.interface import Interface
 from phigen.spec.model import Spec
 from phigen.targets.header import split
 

@@ -11,7 +11,8 @@ import numpy as np
 from phigen.analysis.arrays import Floats, evaluate
 from phigen.analysis.race import Runner
 from phigen.geometry.system import System
-from phigen.runtime.interface import Backend, BackendError, row_steps
+from phigen.runtime.backend import Backend
+from phigen.runtime.interface import BackendError, row_steps
 from phigen.runtime.session import rows_along
 
 

@@ -1,0 +1,52 @@
+"""What the runtime asks of a back end: a loaded solver of one target."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Protocol
+
+from phigen.runtime.interface import Floats
+from phigen.runtime.session import Session
+
+
+class Backend(Protocol):
+    """A loaded solver.
+
+    States are float64 arrays whose last axis is the coordinates. ``parameters`` holds every parameter, in the order
+    of declaration. Arguments were checked by the caller. A failing step raises `BackendError`.
+    """
+
+    target: str
+
+    @property
+    def identity(self) -> str:
+        """A hash of all that decides the results, and what bytes of a session mean."""
+        ...
+
+    def start(self, x0: Floats, parameters: Mapping[str, float]) -> Session:
+        """A session at x0 (DIM,)."""
+        ...
+
+    def restored(self, saved: bytes, parameters: Mapping[str, float]) -> Session:
+        """The session whose `Session.saved` bytes these are, made by a back end of the same `identity`."""
+        ...
+
+    def with_gauge(self, gauge: Floats) -> Backend:
+        """A back end whose trajectories all have the given gauge, one value for each Casimir of the gauge."""
+        ...
+
+    def ensemble(self, x0: Floats, h: float, steps: int, parameters: Mapping[str, float]) -> Floats:
+        """Final states (members, DIM) of initial states (members, DIM)."""
+        ...
+
+    def hamiltonian(self, x: Floats, parameters: Mapping[str, float]) -> Floats:
+        """H of the states (rows, DIM), shape (rows,)."""
+        ...
+
+    def casimirs(self, x: Floats, parameters: Mapping[str, float]) -> Floats:
+        """Casimirs of the states (rows, DIM), shape (rows, number of Casimirs)."""
+        ...
+
+    def vector_field(self, x: Floats, parameters: Mapping[str, float]) -> Floats:
+        """π∇H at the states (rows, DIM), the same shape."""
+        ...
