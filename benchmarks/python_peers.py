@@ -1,4 +1,4 @@
-"""Peers that Python users would pick: scipy, and heyoka and numba where installed (``pip install 'phigen[bench]'``)."""
+"""Peers that Python users would pick: scipy, and heyoka and numba where installed (``pip install -e '.[bench]'``)."""
 
 from __future__ import annotations
 

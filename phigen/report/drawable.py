@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from importlib.util import find_spec
 
+from phigen.analysis.drawing.palette import INSTALLED_BY
+
 #: What the page says where matplotlib is missing.
-NO_FIGURES = "There are no figures on this page, since matplotlib was not installed: pip install 'phigen[plot]'."
+NO_FIGURES = f"There are no figures on this page, since matplotlib was not installed: {INSTALLED_BY}."
 
 
 def drawable() -> bool:

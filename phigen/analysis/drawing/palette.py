@@ -36,6 +36,9 @@ PALETTE: Mapping[str, str] = {
 }
 SERIES = tuple(colour for role, colour in PALETTE.items() if role.startswith("series"))
 
+#: The command that installs what the extra ``plot`` names: true in a checkout and of any release.
+INSTALLED_BY = "pip install matplotlib"
+
 #: Files that figures are written to.
 SUFFIXES = (".png", ".svg", ".pdf")
 
@@ -84,8 +87,8 @@ def require_matplotlib() -> None:
     try:
         import matplotlib  # noqa: F401
     except ImportError:
-        hint = "it is the optional extra plot: pip install 'phigen[plot]'"
-        raise ToolchainError(f"figures need matplotlib, which is not installed\n  hint: {hint}") from None
+        message = f"figures need matplotlib, which is not installed\n  hint: {INSTALLED_BY}"
+        raise ToolchainError(message) from None
 
 
 @contextmanager
