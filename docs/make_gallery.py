@@ -22,7 +22,6 @@ from phigen.runtime.interface import BackendError
 from phigen.runtime.session import rows_along
 from phigen.runtime.solver import Solver
 from phigen.spec.model import Run, Spec
-from phigen.symbolic.expression import natural_key
 
 DOCS = Path(__file__).resolve().parent
 PAGE, FACTS, FIGURES = DOCS / "gallery.md", DOCS / "figures" / "gallery.json", DOCS / "figures" / "gallery"
@@ -44,12 +43,12 @@ This page is made by `python docs/make_gallery.py`.
 
 def names() -> list[str]:
     """The corpus, in the order of `phigen list`."""
-    return sorted((p.stem for p in resources.bundled_specs().glob("*.yaml")), key=natural_key)
+    return list(resources.bundled())
 
 
 def source(name: str) -> Spec:
     """A spec of the corpus."""
-    return spec.load(resources.bundled_specs() / f"{name}.yaml")
+    return spec.load(resources.bundled()[name])
 
 
 def longest_run(found: Spec) -> Run:

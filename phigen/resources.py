@@ -23,6 +23,17 @@ def bundled_specs() -> Path:
     return _find("specs")
 
 
+def bundled() -> dict[str, Path]:
+    """The files of the bundled specs by their names."""
+    return {path.stem: path for path in sorted(bundled_specs().glob("*.yaml"))}
+
+
+def bundled_name(file: str) -> str | None:
+    """The name of the bundled spec that is in a file, None if that is another file."""
+    path = Path(file)
+    return path.stem if path.is_absolute() and bundled().get(path.stem) == path else None
+
+
 def _find(name: str) -> Path:
     # The checkout comes second: a wheel must not pick up a stray folder of site-packages.
     for folder in (_PACKAGE / "_data" / name, _PACKAGE.parent / name):

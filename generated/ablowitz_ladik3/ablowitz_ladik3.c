@@ -9,7 +9,7 @@
  *   one evaluation of the equation for p: 39 additions, 90 multiplications, 3 divisions
  *
  * spec: ablowitz_ladik3, sha256 a19d6edf1db5d8f1f730a954b05596f3772fa764597865f240bd9a4588aef6f0
- * to regenerate: phigen build ablowitz_ladik3.yaml
+ * to regenerate: phigen build ablowitz_ladik3
  * DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
  *
  * SPDX-License-Identifier: 0BSD

@@ -7,7 +7,7 @@
 #   one evaluation of the equation for p: 55 additions, 83 multiplications
 #
 # spec: charged_particle, sha256 5546f846c6444f019b02059d5ab6cdbbca691ad1ca1e12be887fb75f3eaa0a40
-# to regenerate: phigen build charged_particle.yaml
+# to regenerate: phigen build charged_particle
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 #
 # SPDX-License-Identifier: 0BSD

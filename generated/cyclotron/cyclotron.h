@@ -8,7 +8,7 @@
  *   one Newton iteration: 5 additions, 21 multiplications
  *
  * spec: cyclotron, sha256 f90648e1d73073a8c40c47224a26fb5233122a8f534d5506c6c46aeebf7dde47
- * to regenerate: phigen build cyclotron.yaml
+ * to regenerate: phigen build cyclotron
  * DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
  *
  * SPDX-License-Identifier: 0BSD

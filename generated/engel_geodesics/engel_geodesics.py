@@ -7,7 +7,7 @@
 #   one Newton iteration: 21 additions, 54 multiplications
 #
 # spec: engel_geodesics, sha256 2c582262335611f49c35b4a01123706232a303c9bdbfdaca81a47840c54ec956
-# to regenerate: phigen build engel_geodesics.yaml
+# to regenerate: phigen build engel_geodesics
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 #
 # SPDX-License-Identifier: 0BSD

@@ -8,7 +8,7 @@
  *   one Newton iteration: 90 additions, 157 multiplications, 2 functions
  *
  * spec: gaussian_moments, sha256 6a009ff88b586b301091f30b38504f8c7a68f169d883e9983e70897c25e6762b
- * to regenerate: phigen build gaussian_moments.yaml
+ * to regenerate: phigen build gaussian_moments
  * DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
  *
  * SPDX-License-Identifier: 0BSD

@@ -9,7 +9,7 @@
  *   one evaluation of the equation for p: 14 additions, 68 multiplications, 4 divisions, 1 functions
  *
  * spec: guiding_centre, sha256 438d307684354c6dd6718258c2e26d813ea4fdcd1b1359994ab9d0f78c780fe5
- * to regenerate: phigen build guiding_centre.yaml
+ * to regenerate: phigen build guiding_centre
  * DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
  *
  * SPDX-License-Identifier: 0BSD

@@ -8,7 +8,7 @@
  *   one Newton iteration: 4 multiplications
  *
  * spec: harmonic_oscillator, sha256 e958e574b16698d4aa97a0da1c85512b881b696996c00f77d0b496af7d264769
- * to regenerate: phigen build harmonic_oscillator.yaml
+ * to regenerate: phigen build harmonic_oscillator
  * DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
  *
  * SPDX-License-Identifier: 0BSD

@@ -8,7 +8,7 @@
  *   one Newton iteration: 51 additions, 75 multiplications
  *
  * spec: henon_heiles, sha256 3b53479fb609048cb8bda5e0894e3dd6f802eb94ddadc7eb330a09c40ce46449
- * to regenerate: phigen build henon_heiles.yaml
+ * to regenerate: phigen build henon_heiles
  * DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
  *
  * SPDX-License-Identifier: 0BSD

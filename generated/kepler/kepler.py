@@ -7,7 +7,7 @@
 #   one Newton iteration: 376 additions, 560 multiplications, 2 divisions, 1 functions
 #
 # spec: kepler, sha256 4874dc0d710c60140708e41ebaf66583708ef198476a1827e3178a4de2a45e27
-# to regenerate: phigen build kepler.yaml
+# to regenerate: phigen build kepler
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 #
 # SPDX-License-Identifier: 0BSD

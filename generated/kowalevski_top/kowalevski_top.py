@@ -7,7 +7,7 @@
 #   one Newton iteration: 1287 additions, 1352 multiplications, 3 functions
 #
 # spec: kowalevski_top, sha256 2799755b3e3da2be9c8c923424249137334cdb1506fcba1c87c071179c75beaa
-# to regenerate: phigen build kowalevski_top.yaml
+# to regenerate: phigen build kowalevski_top
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 #
 # SPDX-License-Identifier: 0BSD

@@ -7,7 +7,7 @@
 #   one Newton iteration: 603 additions, 713 multiplications, 3 functions
 #
 # spec: lagrange_top, sha256 4c969fa4a402cc869785c21021556d3101cd779e45d647fdbc1c0ecb8e816537
-# to regenerate: phigen build lagrange_top.yaml
+# to regenerate: phigen build lagrange_top
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 #
 # SPDX-License-Identifier: 0BSD

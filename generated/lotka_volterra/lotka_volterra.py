@@ -7,7 +7,7 @@
 #   one Newton iteration: 13 additions, 47 multiplications, 3 divisions, 3 functions
 #
 # spec: lotka_volterra, sha256 a253a78f7e0887e5a834a02b0b1f47451af2de51574fd76b016f875f92baa539
-# to regenerate: phigen build lotka_volterra.yaml
+# to regenerate: phigen build lotka_volterra
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 #
 # SPDX-License-Identifier: 0BSD

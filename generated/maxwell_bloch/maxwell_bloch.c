@@ -8,7 +8,7 @@
  *   one Newton iteration: 19 additions, 42 multiplications
  *
  * spec: maxwell_bloch, sha256 6998467bccf92cc00d1bbe2abe38d3e97c02a9e39e68f54463c214043fe191c9
- * to regenerate: phigen build maxwell_bloch.yaml
+ * to regenerate: phigen build maxwell_bloch
  * DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
  *
  * SPDX-License-Identifier: 0BSD

@@ -8,7 +8,7 @@
  *   one evaluation of the equation for p: 1 additions, 9 multiplications, 2 functions
  *
  * spec: nambu_pendulum, sha256 4a482cc6c1e66da787de49d9112e6ca1c38e0b9e783293e47090388bbe60f416
- * to regenerate: phigen build nambu_pendulum.yaml
+ * to regenerate: phigen build nambu_pendulum
  * DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
  *
  * SPDX-License-Identifier: 0BSD

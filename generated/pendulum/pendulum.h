@@ -8,7 +8,7 @@
  *   one Newton iteration: 21 additions, 29 multiplications, 2 functions
  *
  * spec: pendulum, sha256 c0378c57bf491100d6d09245ab1ff75a89adc0280b656f54517cabb646660482
- * to regenerate: phigen build pendulum.yaml
+ * to regenerate: phigen build pendulum
  * DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
  *
  * SPDX-License-Identifier: 0BSD

@@ -8,7 +8,7 @@
  *   one step: 1 additions, 2 multiplications, 1 functions
  *
  * spec: pendulum_euler, sha256 980cd9a109f0a4d5c32137db8a3109a848b0e374d893a3c5600b123f3d9d0d03
- * to regenerate: phigen build pendulum_euler.yaml
+ * to regenerate: phigen build pendulum_euler
  * DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
  *
  * SPDX-License-Identifier: 0BSD

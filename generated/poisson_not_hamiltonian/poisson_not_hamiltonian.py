@@ -7,7 +7,7 @@
 #   one Newton iteration: 191 additions, 291 multiplications, 4 functions
 #
 # spec: poisson_not_hamiltonian, sha256 3e9bff5b9c04c9b131661df50cd92ec15be998797c3620a96085fb54ee678034
-# to regenerate: phigen build poisson_not_hamiltonian.yaml
+# to regenerate: phigen build poisson_not_hamiltonian
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 #
 # SPDX-License-Identifier: 0BSD

@@ -8,7 +8,7 @@
  *   one Newton iteration: 29 additions, 72 multiplications, 4 divisions, 2 functions
  *
  * spec: predator_prey, sha256 756f4a9cb0ed0e328b63a51b2d6b8dddeb1b3f43ed6e5f1477d35affb9e83153
- * to regenerate: phigen build predator_prey.yaml
+ * to regenerate: phigen build predator_prey
  * DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
  *
  * SPDX-License-Identifier: 0BSD

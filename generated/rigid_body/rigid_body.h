@@ -9,7 +9,7 @@
  *   one Newton iteration: 135 additions, 164 multiplications, 2 functions
  *
  * spec: rigid_body, sha256 6c1237ccc7ee4b24a8f0a329e858795da7fd98ebe563770606bbfbaba9f6e23e
- * to regenerate: phigen build rigid_body.yaml
+ * to regenerate: phigen build rigid_body
  * DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
  *
  * SPDX-License-Identifier: 0BSD

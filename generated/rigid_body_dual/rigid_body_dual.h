@@ -9,7 +9,7 @@
  *   one Newton iteration: 98 additions, 176 multiplications, 2 functions
  *
  * spec: rigid_body_dual, sha256 0e11b9097280029b8ba1ccfb15ded1fd61460b8002163aceea086ead92ecf619
- * to regenerate: phigen build rigid_body_dual.yaml
+ * to regenerate: phigen build rigid_body_dual
  * DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
  *
  * SPDX-License-Identifier: 0BSD

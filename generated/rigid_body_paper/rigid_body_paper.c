@@ -8,7 +8,7 @@
  *   one Newton iteration: 61 additions, 87 multiplications, 2 functions
  *
  * spec: rigid_body_paper, sha256 252e63a465020d4f81a0a44276c75edbb523615ce0cb4a3efc6ebf0241578d2e
- * to regenerate: phigen build rigid_body_paper.yaml
+ * to regenerate: phigen build rigid_body_paper
  * DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
  *
  * SPDX-License-Identifier: 0BSD

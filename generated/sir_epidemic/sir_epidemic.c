@@ -8,7 +8,7 @@
  *   one evaluation of the equation for p: 2 additions, 11 multiplications, 1 divisions
  *
  * spec: sir_epidemic, sha256 115b753136b45d645443f1dd70079639f2bd0e5420635c11a5444e91e153af93
- * to regenerate: phigen build sir_epidemic.yaml
+ * to regenerate: phigen build sir_epidemic
  * DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
  *
  * SPDX-License-Identifier: 0BSD

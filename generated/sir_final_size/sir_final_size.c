@@ -7,7 +7,7 @@
  *   step: implicit in p, each path followed by its Taylor series to round-off
  *
  * spec: sir_final_size, sha256 16f6dca5778a89d3e6268a5247ac978092e188a1137fefcd55249e050f3dcd9f
- * to regenerate: phigen build sir_final_size.yaml
+ * to regenerate: phigen build sir_final_size
  * DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
  *
  * SPDX-License-Identifier: 0BSD

@@ -8,7 +8,7 @@
 #   one evaluation of the equation for p: 84 additions, 156 multiplications
 #
 # spec: sklyanin_gyrostat, sha256 94d457c9aa3e46aec56580365573c4c556c8a0c29c26c22b6d908e85ad6c708e
-# to regenerate: phigen build sklyanin_gyrostat.yaml
+# to regenerate: phigen build sklyanin_gyrostat
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 #
 # SPDX-License-Identifier: 0BSD

@@ -9,7 +9,7 @@
  *   one Newton iteration: 824 additions, 738 multiplications, 4 functions
  *
  * spec: so4_manakov, sha256 e5ef0b8ca1ea64cf1312e35d5c5ef2f6e1fc0f132fbd63bc25720a35fa45a507
- * to regenerate: phigen build so4_manakov.yaml
+ * to regenerate: phigen build so4_manakov
  * DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
  *
  * SPDX-License-Identifier: 0BSD

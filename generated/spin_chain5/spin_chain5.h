@@ -9,7 +9,7 @@
  *   one Newton iteration: 1700 additions, 2144 multiplications, 10 functions
  *
  * spec: spin_chain5, sha256 da0327c7c317a1988908e0a444023e4dbaa180a3aa04a316a6e41501ce41812b
- * to regenerate: phigen build spin_chain5.yaml
+ * to regenerate: phigen build spin_chain5
  * DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
  *
  * SPDX-License-Identifier: 0BSD

@@ -8,7 +8,7 @@
  *   one Newton iteration: 143 additions, 189 multiplications, 4 functions
  *
  * spec: toda3, sha256 c7dc1027841ad0ebd0aac03361a0c390f021c59279da1553a4dcfe3243181c41
- * to regenerate: phigen build toda3.yaml
+ * to regenerate: phigen build toda3
  * DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
  *
  * SPDX-License-Identifier: 0BSD

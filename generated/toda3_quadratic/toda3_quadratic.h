@@ -7,7 +7,7 @@
  *   step: implicit in p, each path followed by its Taylor series to round-off
  *
  * spec: toda3_quadratic, sha256 7af77757733d7da7009fd5c930b7974289267141d3afbc870017a911873e4cad
- * to regenerate: phigen build toda3_quadratic.yaml
+ * to regenerate: phigen build toda3_quadratic
  * DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
  *
  * SPDX-License-Identifier: 0BSD

@@ -8,7 +8,7 @@
  *   one Newton iteration: 168 additions, 375 multiplications, 5 divisions, 5 functions
  *
  * spec: volterra5, sha256 cfd60e7b7b6deffb6e5297d17c105b63a43ab52b9aeaa9bde72b05fd871e6d03
- * to regenerate: phigen build volterra5.yaml
+ * to regenerate: phigen build volterra5
  * DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
  *
  * SPDX-License-Identifier: 0BSD

@@ -8,7 +8,7 @@
  *   one Newton iteration: 701 additions, 1358 multiplications, 3 divisions
  *
  * spec: vortices3, sha256 9f4ece29d2cb2bfd4d374437bcb1bba6d3a05731db8beb500f407873d6a3394c
- * to regenerate: phigen build vortices3.yaml
+ * to regenerate: phigen build vortices3
  * DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
  *
  * SPDX-License-Identifier: 0BSD

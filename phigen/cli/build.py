@@ -13,7 +13,7 @@ import click
 from phigen.cli.console import Console, counted, indented, mend, out, pass_console, verbosity
 from phigen.cli.failures import Collector
 from phigen.cli.generation import DIRECTORY, Options, files_of, output_options
-from phigen.cli.sources import load_all, many_specs
+from phigen.cli.sources import found, load_all, many_specs
 from phigen.errors import CheckError
 
 if TYPE_CHECKING:
@@ -55,8 +55,9 @@ def command(
 ) -> None:
     """Write the solvers of specs: DIR/NAME/NAME.h, NAME.c and NAME.py.
 
-    SPEC is a file, or a folder that is searched for *.yaml. What the spec claims is proved first; nothing is
-    written if there is an error in any spec. Files that were edited by hand are not overwritten.
+    SPEC is a file, a folder that is searched for *.yaml, or the name of a bundled spec. What the spec claims is
+    proved first; nothing is written if there is an error in any spec. Files that were edited by hand are not
+    overwritten.
     """
     if (checking or diff) and (compiling or certify):
         raise click.UsageError("--compile and --certify write files; --check and --diff write nothing")
@@ -110,7 +111,7 @@ def _orphans(spec_files: Sequence[str], compilations: Sequence[Compilation], opt
     """Files whose spec has gone; only a run over a folder can know."""
     from phigen.cli.outputs import SUFFIXES, orphans
 
-    if any(Path(file).is_dir() for file in spec_files):
+    if any(Path(found(file)).is_dir() for file in spec_files):
         names = [c.spec.name for c in compilations]
         yield from orphans(options.directory, names, options.targets or SUFFIXES)
 

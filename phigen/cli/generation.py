@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
+from phigen import resources
 from phigen.cli.sources import CORRECTIONS, ORDER, scheme_option
 
 if TYPE_CHECKING:
@@ -91,7 +92,7 @@ def generate(compilation: Compilation, target: str, options: Options) -> dict[st
     from phigen.compiler import emit
 
     spec, single = compilation.spec, options.single_file and target == "c"
-    words = ["phigen build", f"{spec.name}.yaml"]
+    words = ["phigen build", spec.name if _is_bundled(spec) else f"{spec.name}.yaml"]
     words += ["-t", target] if target not in spec.targets else []
     words += ["--order", str(options.order)] if options.order not in (None, spec.order) else []
     words += ["--scheme", options.scheme] if options.scheme not in (None, spec.scheme) else []
@@ -99,6 +100,12 @@ def generate(compilation: Compilation, target: str, options: Options) -> dict[st
     words += ["--tangent"] if options.tangent and not spec.extras.tangent else []
     words += ["--modified", str(options.modified)] if options.modified is not None else []
     return emit(compilation.program, target, " ".join(words), single_file=single)
+
+
+def _is_bundled(spec: Spec) -> bool:
+    """Whether the bundled spec of that name has this text, wherever it was read from."""
+    file = resources.bundled().get(spec.name)
+    return file is not None and file.read_text(encoding="utf-8") == spec.source
 
 
 def files_of(compilation: Compilation, options: Options) -> dict[str, str]:

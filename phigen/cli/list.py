@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from phigen.cli.completion import bundled_names
 from phigen.cli.console import out, table, verbosity
 
 if TYPE_CHECKING:
@@ -16,22 +17,21 @@ if TYPE_CHECKING:
 
 
 @click.command("list")
-@click.option("--path", "name", metavar="NAME", help="Print the path of one spec instead.")
+@click.option("--path", "name", metavar="NAME", shell_complete=bundled_names, help="Print only the path of this one.")
 @click.option("--json", "as_json", is_flag=True, help="For machines: one object per spec.")
 @verbosity
 def command(name: str | None, as_json: bool) -> None:
     """List the bundled specs: name, dimension, kind of π, title.
 
-    To look at one, or to start from it: cp "$(phigen list --path kepler)" .
+    Commands take their names: phigen run kepler. To start from one: cp "$(phigen list --path kepler)" .
     """
     from phigen import resources, spec
-    from phigen.symbolic.expression import natural_key
 
-    files = {p.stem: p for p in resources.bundled_specs().glob("*.yaml")}
+    files = resources.bundled()
     if name is not None:
         click.echo(_path_of(name, files))
         return
-    specs = [spec.load(files[stem]) for stem in sorted(files, key=natural_key)]
+    specs = [spec.load(file) for file in files.values()]
     if as_json:
         click.echo(json.dumps([_described(s, str(files[s.name])) for s in specs], indent=2, ensure_ascii=False))
         return

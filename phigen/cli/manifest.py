@@ -33,7 +33,7 @@ _ABOUT = (
 
 @dataclass(frozen=True)
 class Entry:
-    """One vendored solver. ``spec_file`` is relative to the folder, None for a spec that is far from it.
+    """One vendored solver. ``spec_file`` is relative to the folder, or names a bundled spec; None if it is far.
 
     ``files`` maps names to the sha256 of their bytes.
     """

@@ -10,7 +10,7 @@ import click
 
 from phigen.cli.console import Console, out, pass_console, verbosity
 from phigen.cli.experiment import prepared
-from phigen.cli.sources import ORDER, load_one, one_spec, scheme_option
+from phigen.cli.sources import ORDER, load_one, one_spec, run_option, scheme_option
 from phigen.errors import CheckError
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 @click.command("report")
 @one_spec
 @click.option("-o", "--output", metavar="FILE", help="Where to write the page; - is stdout.  [default: NAME.html]")
-@click.option("--run", "name", metavar="NAME", help="Which run of the spec.  [default: the first]")
+@run_option
 @click.option("--order", metavar="K", type=ORDER, help="Order of the method, instead of the spec's.")
 @scheme_option
 @click.option("--lyapunov", is_flag=True, help="Lyapunov exponents of the run as well.")

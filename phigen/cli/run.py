@@ -12,7 +12,7 @@ from phigen.cli.console import Console, out, pass_console, verbosity
 from phigen.cli.experiment import loaded, prepared
 from phigen.cli.interruption import InterruptedRunError
 from phigen.cli.run_summary import described_run, finite, print_summary
-from phigen.cli.sources import FIGURES, ORDER, file_ending, load_one, one_spec, scheme_option
+from phigen.cli.sources import FIGURES, ORDER, file_ending, load_one, one_spec, run_option, scheme_option
 
 if TYPE_CHECKING:
     from phigen.cli.recording import Recorder
@@ -23,7 +23,7 @@ _TABLES = (".csv", ".npz")
 
 @click.command("run")
 @one_spec
-@click.option("--run", "name", metavar="NAME", help="Which run of the spec.  [default: the first]")
+@run_option
 @click.option("-t", "--target", type=click.Choice(["auto", "c", "numpy"]), default="auto", show_default=True)
 @click.option("--order", metavar="K", type=ORDER, help="Order of the method, instead of the spec's.")
 @scheme_option

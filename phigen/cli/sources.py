@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from phigen import resources
+from phigen.cli.completion import runs, specs
 from phigen.cli.failures import Collector
 from phigen.errors import Diagnostic, SpecError
 from phigen.spec import limits
@@ -33,8 +35,15 @@ scheme_option = click.option(
     "--scheme", type=click.Choice(SCHEMES), help="How steps are made, instead of the spec's scheme."
 )
 
-one_spec = click.argument("spec_file", metavar="SPEC", type=click.Path())
-many_specs = click.argument("spec_files", metavar="SPEC...", nargs=-1, required=True, type=click.Path())
+#: Which run of a spec; the argument SPEC stands before it.
+run_option = click.option(
+    "--run", "name", metavar="NAME", shell_complete=runs, help="Which run of the spec.  [default: the first]"
+)
+
+one_spec = click.argument("spec_file", metavar="SPEC", type=click.Path(), shell_complete=specs)
+many_specs = click.argument(
+    "spec_files", metavar="SPEC...", nargs=-1, required=True, type=click.Path(), shell_complete=specs
+)
 
 
 def file_ending(*suffixes: str) -> Callable[[click.Context, click.Parameter, str | None], Path | None]:
@@ -50,15 +59,34 @@ def file_ending(*suffixes: str) -> Callable[[click.Context, click.Parameter, str
     return checked
 
 
-def load_one(path: str) -> Spec:
-    """The spec in a file, with a hint where the file is missing and a bundled spec has that name."""
+def load_one(given: str) -> Spec:
+    """The spec in a file, or the bundled one of that name if there is no such file."""
     from phigen import spec
 
-    if not Path(path).exists():
-        raise SpecError([Diagnostic(f"there is no file {path!r}", hint=_bundled_hint(path))])
+    path = found(given)
     if Path(path).is_dir():
         raise SpecError([Diagnostic(f"{path!r} is a folder; this command takes one spec file")])
     return spec.load(path)
+
+
+def found(given: str) -> str:
+    """The path itself if there is a file or a folder with specs; else that of the bundled spec of that name.
+
+    Raises `SpecError` if there is none of these.
+    """
+    path = Path(given)
+    # What `phigen build kepler -o .` makes is no reason not to find kepler any more.
+    if given in resources.bundled() and (not path.exists() or (path.is_dir() and not any(_below(given)))):
+        return str(resources.bundled()[given])
+    if path.exists():
+        return given
+    also = "" if set(given) & {"/", "."} else " and no bundled spec"
+    raise SpecError([Diagnostic(f"there is no file{also} {given!r}", hint=_near(given))])
+
+
+def as_given(spec: Spec) -> str:
+    """What names a spec on a command line: its file, or the name of a bundled one."""
+    return resources.bundled_name(spec.file) or spec.file
 
 
 def load_all(paths: Sequence[str], collector: Collector) -> list[Spec]:
@@ -66,47 +94,54 @@ def load_all(paths: Sequence[str], collector: Collector) -> list[Spec]:
 
     Two specs of one name are an error: their output would be in the same place.
     """
-    found: dict[str, Spec] = {}
-    for file in dict.fromkeys(file for path in paths for file in spec_files(path)):
+    taken: dict[str, Spec] = {}
+    files: list[str] = []
+    for path in paths:
+        with collector.collecting():
+            files += spec_files(path)
+    for file in dict.fromkeys(files):
         with collector.collecting():
             spec = load_one(file)
-            if spec.name in found:
+            if spec.name in taken:
                 hint = "names are prefixes of the generated code, and must differ"
-                message = f"the name {spec.name!r} is taken by {found[spec.name].file}"
+                message = f"the name {spec.name!r} is taken by {taken[spec.name].file}"
                 raise SpecError([spec.diagnostic(("name",), message, hint)])
-            found[spec.name] = spec
-    return list(found.values())
+            taken[spec.name] = spec
+    return list(taken.values())
 
 
-def spec_files(path: str) -> Iterator[str]:
-    """The path itself, or the spec files below it if it is a folder, hidden ones left out."""
-    from phigen.symbolic.expression import natural_key
-
+def spec_files(given: str) -> Iterator[str]:
+    """The spec file or the bundled spec itself, or the spec files below it if it is a folder, hidden ones left out."""
+    path = found(given)
     if not Path(path).is_dir():
         yield path
         return
-    count = 0
+    files = list(_below(path))
+    if not files:
+        raise SpecError([Diagnostic(f"there are no specs (*.yaml) in the folder {path!r}")])
+    yield from files
+
+
+def _below(path: str) -> Iterator[str]:
+    from phigen.symbolic.expression import natural_key
+
     for folder, folders, files in os.walk(path):
         folders[:] = sorted((f for f in folders if not f.startswith(".")), key=natural_key)
         for file in sorted(files, key=natural_key):
             if file.endswith(SUFFIXES) and not file.startswith("."):
-                count += 1
                 yield os.path.join(folder, file)  # noqa: PTH118  (as the user wrote it: "./specs" stays "./specs")
-    if not count:
-        raise SpecError([Diagnostic(f"there are no specs (*.yaml) in the folder {path!r}")])
 
 
-def _bundled_hint(path: str) -> str:
+def _near(given: str) -> str:
+    """What may have been meant: the bundled spec, a file beside it of nearly that name, a bundled one, or nothing."""
     from difflib import get_close_matches
 
-    from phigen import resources
-
-    name = Path(path).stem
-    bundled = {p.stem: p for p in resources.bundled_specs().glob("*.yaml")}
-    if name in bundled:
-        return f'{name} is a bundled spec; write "$(phigen list --path {name})"'
-    beside = [p.name for p in Path(path).parent.glob("*.y*ml")] if Path(path).parent.is_dir() else []
-    near = get_close_matches(Path(path).name, beside, n=1)
-    if near:
-        return f"did you mean {str(Path(path).with_name(near[0]))!r}?"
+    path, bundled = Path(given), resources.bundled()
+    if path.stem in bundled:
+        return f"{path.stem} is a bundled spec, and its name alone means that"
+    beside = [p.name for p in path.parent.glob("*.y*ml")] if path.parent.is_dir() else []
+    if near := get_close_matches(path.name, beside, n=1) or [p for p in beside if Path(p).stem == path.name]:
+        return f"did you mean {str(path.with_name(near[0]))!r}?"
+    if near := get_close_matches(path.stem, bundled, n=3):
+        return f"did you mean the bundled spec {' or '.join(near)}?"
     return "phigen new NAME writes a spec to start from; phigen list shows the bundled ones"

@@ -11,7 +11,7 @@ import click
 
 from phigen.cli.console import Console, out, pass_console, verbosity
 from phigen.cli.experiment import prepared
-from phigen.cli.sources import FIGURES, file_ending, load_one, one_spec
+from phigen.cli.sources import FIGURES, file_ending, load_one, one_spec, run_option
 from phigen.cli.tune_summary import described, print_tuning, unreached
 from phigen.errors import CheckError
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 @click.command("tune")
 @one_spec
-@click.option("--run", "name", metavar="NAME", help="Which run of the spec.  [default: the first]")
+@run_option
 @click.option(
     "--accuracy", type=click.FloatRange(1e-15, 0.5), default=1e-8, show_default=True, metavar="E",
     help="The largest error that is allowed, relative.",

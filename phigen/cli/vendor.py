@@ -11,13 +11,15 @@ from typing import TYPE_CHECKING
 
 import click
 
+from phigen import resources
 from phigen._version import __version__
 from phigen.cli import manifest
+from phigen.cli.completion import specs
 from phigen.cli.console import Console, counted, indented, mend, pass_console, verbosity
 from phigen.cli.failures import Collector
 from phigen.cli.generation import Options, files_of, output_options
 from phigen.cli.manifest import Entry
-from phigen.cli.sources import SUFFIXES, load_all
+from phigen.cli.sources import SUFFIXES, as_given, load_all
 from phigen.errors import CheckError
 
 if TYPE_CHECKING:
@@ -56,7 +58,7 @@ class Made:
 
 
 @click.command("vendor")
-@click.argument("paths", metavar="[SPEC...] DEST", nargs=-1, required=True, type=click.Path())
+@click.argument("paths", metavar="[SPEC...] DEST", nargs=-1, required=True, type=click.Path(), shell_complete=specs)
 @output_options
 @click.option("--check", "checking", is_flag=True, help="Write nothing; fail if a file is not as it should be.")
 @click.option("--force", is_flag=True, help="Overwrite files that were edited by hand or are not phigen's.")
@@ -139,7 +141,8 @@ def _from_specs(
     for spec in load_all(spec_files, collector) if spec_files else []:
         known = entries.get(spec.name)
         chosen = known.options if checking and known and not options.words else options
-        orders.append(Order(spec, manifest.relative(spec.file, folder), chosen))
+        origin = resources.bundled_name(spec.file) or manifest.relative(spec.file, folder)
+        orders.append(Order(spec, origin, chosen))
     return orders
 
 
@@ -163,9 +166,11 @@ def _from_manifest(folder: Path, entries: Mapping[str, Entry], collector: Collec
 
 
 def _path_of_spec(folder: Path, entry: Entry) -> Path | None:
-    """The file of a spec, as seen from the working directory, if it is there."""
+    """The file of a spec, as seen from the working directory, or the bundled one, if it is there."""
     if entry.spec_file is None:
         return None
+    if bundled := resources.bundled().get(entry.spec_file):
+        return bundled
     path = Path(os.path.normpath(folder / entry.spec_file))
     return path if path.is_file() else None
 
@@ -239,7 +244,7 @@ class Problem:
 def _problems(folder: Path, entries: Mapping[str, Entry], made: Made, spec_files: Sequence[str]) -> Iterator[Problem]:
     """What is wrong with the files of one solver."""
     order = made.order
-    words = [order.spec.file, str(folder), *order.options.words] if spec_files else [str(folder)]
+    words = [as_given(order.spec), str(folder), *order.options.words] if spec_files else [str(folder)]
     known = entries.get(order.spec.name)
     for file in sorted({*made.files, *(known.files if known else ())}):
         path = folder / file

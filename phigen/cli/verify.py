@@ -14,7 +14,7 @@ import click
 from phigen.cli.console import Console, heading, out, pass_console, table, verbosity
 from phigen.cli.experiment import Experiment, prepared
 from phigen.cli.failures import Collector
-from phigen.cli.sources import FIGURES, ORDER, file_ending, load_all, many_specs, scheme_option
+from phigen.cli.sources import FIGURES, ORDER, file_ending, load_all, many_specs, run_option, scheme_option
 from phigen.errors import CheckError, StepError
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ _NOT_FINITE = {math.inf: "∞", -math.inf: "-∞"}
 
 @click.command("verify")
 @many_specs
-@click.option("--run", "name", metavar="NAME", help="Which run of the spec.  [default: the first]")
+@run_option
 @click.option("--order", metavar="K", type=ORDER, help="Order of the method, instead of the spec's.")
 @scheme_option
 @click.option("--quick", is_flag=True, help="Fewer steps.")

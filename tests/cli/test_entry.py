@@ -1,13 +1,16 @@
 """What holds for every command: imports, exit codes, streams, colours, interrupts."""
 
+import json
 import os
 import re
 import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import pytest
+from click.shell_completion import BashComplete
 
 from phigen import resources
 from phigen.cli import COMMANDS, group
@@ -130,8 +133,47 @@ def test_command_with_typing_error_gets_a_suggestion(phigen):
     assert "Did you mean 'build'?" in phigen("biuld").stderr
 
 
-def test_missing_spec_of_a_bundled_name_says_where_it_is(phigen, in_tmp):
-    assert "phigen list --path rigid_body" in phigen("run", "rigid_body.yaml").stderr
+@pytest.mark.parametrize(
+    ("given", "hint"),
+    [
+        ("rigid_body.yaml", "rigid_body is a bundled spec, and its name alone means that"),
+        ("keplr", "did you mean the bundled spec kepler?"),
+        ("tumbler", "did you mean 'tumbler.yaml'?"),
+        ("sub/henon", "phigen new NAME"),
+    ],
+)
+@pytest.mark.parametrize("command", ["run", "build"])
+def test_missing_spec_suggests_names_that_are_near(phigen, write, command, given, hint):
+    write("tumbler.yaml")
+    done = phigen(command, given)
+    assert done.exit_code == 1
+    assert repr(given) in done.stderr
+    assert hint in done.stderr
+
+
+def test_bundled_spec_is_found_by_its_name(phigen, in_tmp):
+    for command in ("check", "show", "build"):
+        assert phigen(command, "cyclotron").exit_code == 0, command
+    assert "to regenerate: phigen build cyclotron\n" in Path("generated/cyclotron/cyclotron.c").read_text()
+
+
+def test_file_of_the_name_of_a_bundled_spec_wins(phigen, write):
+    write("cyclotron", name="mine")
+    assert json.loads(phigen("show", "cyclotron", "--json").stdout)["name"] == "mine"
+
+
+def test_bundled_spec_is_found_beside_its_output_and_what_is_there_already_is_current(phigen, in_tmp):
+    for name in ("cyclotron", "pendulum"):
+        assert phigen("build", name, "-o", ".").exit_code == 0
+    assert phigen("build", "cyclotron", "-o", ".", "--check").exit_code == 0
+
+
+def test_changed_copy_of_a_bundled_spec_is_regenerated_from_its_file(phigen, write):
+    text = resources.bundled()["cyclotron"].read_text(encoding="utf-8")
+    for title, command in ((None, "phigen build cyclotron"), ("title: Mine", "phigen build cyclotron.yaml")):
+        write("here/cyclotron.yaml", re.sub("title: .*", title, text) if title else text)
+        assert phigen("build", "here").exit_code == 0
+        assert f"to regenerate: {command}\n" in Path("generated/cyclotron/cyclotron.h").read_text()
 
 
 def test_no_colour_in_pipes_and_under_no_color(phigen, write):
@@ -196,6 +238,35 @@ def test_completion_script_is_offered():
     code = "from phigen.cli import group; group.main(prog_name='phigen', args=[])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, env=env)
     assert "_PHIGEN_COMPLETE=bash_complete" in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("line", "offered"),
+    [
+        ("run kep", ["plain,kepler"]),
+        ("run k", ["plain,krill.yaml", "plain,kelp/", "plain,kepler", "plain,kowalevski_top"]),
+        ("vendor kep", ["plain,kepler"]),
+        ("run kr", ["file,kr"]),
+        ("run kelp/", ["file,kelp/"]),
+        ("list --path kep", ["plain,kepler"]),
+        ("run kepler --run ", ["plain,eccentric", "plain,circle"]),
+        ("verify kepler krill.yaml --run t", ["plain,turn"]),
+        ("tune wrong.yaml --run ", []),
+        ("report lost.yaml --run ", []),
+        ("run --run ", []),
+    ],
+)
+def test_shell_is_offered_names_and_runs(phigen, write, line, offered):
+    write("krill.yaml")
+    write("wrong.yaml", "phigen: 1\n")
+    Path("kelp").mkdir()
+    words = ["phigen", *line.split(" ")]
+    environment = {"COMP_WORDS": " ".join(words), "COMP_CWORD": str(len(words) - 1)}
+    completer = BashComplete(group, {}, "phigen", "_PHIGEN_COMPLETE")
+    with pytest.MonkeyPatch.context() as patch:
+        for name, value in environment.items():
+            patch.setenv(name, value)
+        assert completer.complete().splitlines() == offered
 
 
 def test_error_classes_keep_their_codes():

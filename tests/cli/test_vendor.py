@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from phigen import resources
 from phigen.cli import manifest
 
 EXT = Path("project/ext")
@@ -231,6 +232,18 @@ def test_damaged_manifest_is_refused(phigen, vendored, before, after, told):
         assert done.exit_code == 5
         assert told in done.stderr
         assert "hint: take phigen-vendor.json from version control" in done.stderr
+
+
+def test_bundled_spec_is_vendored_by_its_name_and_followed_by_it(phigen, in_tmp, monkeypatch):
+    assert phigen("vendor", "cyclotron", EXT, "-t", "c").exit_code == 0
+    assert solvers()["cyclotron"]["command"] == "phigen vendor cyclotron . -t c"
+    assert solvers()["cyclotron"]["spec"]["file"] == "cyclotron"
+    changed = Path("cyclotron.yaml")
+    changed.write_text(resources.bundled()["cyclotron"].read_text().replace("step: 0.05", "step: 0.06"))
+    monkeypatch.setattr(resources, "bundled", lambda: {"cyclotron": changed.absolute()})
+    done = phigen("vendor", "--check", EXT)
+    assert done.exit_code == 5
+    assert "stale: its spec has changed" in done.stderr
 
 
 def test_spec_file_that_became_another_system_is_noticed(phigen, vendored):

@@ -1,0 +1,43 @@
+"""What the shell offers for names: bundled specs, and the runs of the spec that was given."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+from click.shell_completion import CompletionItem
+
+from phigen import resources
+
+
+def specs(ctx: click.Context, parameter: click.Parameter, begun: str) -> list[CompletionItem[str]]:
+    """Bundled specs, and the spec files and folders here; where no bundled one is meant, the shell finds the files."""
+    from phigen.cli.sources import SUFFIXES
+
+    named = bundled_names(ctx, parameter, begun)
+    if not named:
+        return [CompletionItem(begun, type="file")]
+    near = [path for path in sorted(Path().glob("[!.]*")) if path.name.startswith(begun)]
+    files = [path.name for path in near if path.suffix in SUFFIXES]
+    folders = [f"{path.name}/" for path in near if path.is_dir()]
+    return [CompletionItem(name) for name in (*files, *folders, *named)]
+
+
+def bundled_names(ctx: click.Context, parameter: click.Parameter, begun: str) -> list[str]:
+    """Bundled specs."""
+    return [name for name in resources.bundled() if name.startswith(begun)]
+
+
+def runs(ctx: click.Context, parameter: click.Parameter, begun: str) -> list[str]:
+    """The runs of the specs given so far; none of a spec with errors, which a shell has no place for."""
+    from phigen.cli.sources import load_one
+    from phigen.errors import PhigenError
+
+    found: list[str] = []
+    # click stops at an option without value, before it has told which parameter the other words belong to.
+    for given in ctx.args:
+        try:
+            found += load_one(given).runs
+        except PhigenError:
+            continue
+    return [name for name in dict.fromkeys(found) if name.startswith(begun)]
