@@ -1,10 +1,11 @@
 """The pipeline, on one screen.
 
-    spec file ─► Spec ─► System ─► BiRealisation ─► Program ─► source files
-                                └─► Splitting ─────┘
+    spec file ─► Spec ─► System ─► BiRealisation ─► Gauged ─► Discretisation ─► Program ─► source files
+                                └─► Splitting ──────────────────────────────────┘
 
 Each stage is a function from one frozen dataclass to the next; `Compilation` keeps what each of them made and the
-seconds it took. The Hamilton–Jacobi series and the staging happen inside `build_program`.
+seconds it took. `Gauged` holds the Hamilton–Jacobi series, which is computed once, as far as any stage or proof asks;
+`Discretisation` the generating function.
 """
 
 from __future__ import annotations
@@ -21,12 +22,12 @@ from phigen.realisations.catalogue import realise
 from phigen.realisations.protocol import BiRealisation
 from phigen.scheme.assemble import build_program
 from phigen.scheme.choosing import plan as plan_splitting
-from phigen.scheme.discretisation import series_of
-from phigen.scheme.gauge import Gauge, choose, given
+from phigen.scheme.discretisation import Discretisation, discretise
+from phigen.scheme.gauge import Gauge, Gauged, choose, given
 from phigen.scheme.order import Order, plan_order
 from phigen.scheme.program import Program
 from phigen.scheme.splitting import build_splitting
-from phigen.series.hamilton_jacobi import PolynomialSeries
+from phigen.series.hamilton_jacobi import HamiltonJacobi
 from phigen.spec.model import Extras, Spec
 from phigen.splitting.parts import Splitting, split
 
@@ -45,6 +46,8 @@ class Compilation:
     gauge: Gauge = field(default_factory=Gauge)
     seconds: Mapping[str, float] = field(default_factory=dict)
     splitting: Splitting | None = None
+    gauged: Gauged | None = None
+    scheme: Discretisation | None = None
 
     @property
     def chart(self) -> BiRealisation:
@@ -71,11 +74,14 @@ class Compilation:
     @property
     def discretised(self) -> System:
         """The system with the Hamiltonian that is discretised: H less the Casimirs of the gauge."""
-        return self.gauge.applied(self.system)
+        return self.gauged.system if self.gauged else self.gauge.applied(self.system)
 
-    def series(self, terms: int) -> PolynomialSeries:
-        """S_1 … S_terms of `discretised`; the symbol ``gauge:C`` is the multiple of C that the solver chooses."""
-        return series_of(self.discretised, self.chart, terms, self.gauge.symbols)
+    @property
+    def series(self) -> HamiltonJacobi:
+        """The series of `discretised`; the symbol ``gauge:C`` is the multiple of C that the solver chooses."""
+        if self.gauged is None:
+            raise ValueError(f"{self.spec.name} is compiled to a splitting, which has no generating function")
+        return self.gauged.series
 
 
 def compile_spec(
@@ -105,14 +111,16 @@ def compile_spec(
     choice = replace(spec.birealisation, order=order) if order else spec.birealisation
     realisation = clock.timed("bi-realisation", lambda: realise(source, choice))
     plan = plan_order(order or spec.order, None if order else spec.terms, symmetric=realisation.symmetric)
-    gauge = clock.timed("gauge", lambda: choose(source, realisation, spec.gauge))
-    program = clock.timed(
-        "program",
-        lambda: build_program(
-            source, realisation, plan, composition=spec.composition, gauge=gauge, solver=spec.solver, **described
-        ),
+    gauged = clock.timed("gauge", lambda: choose(source, realisation, spec.gauge))
+    reached = clock.timed(
+        "generating function", lambda: discretise(gauged.system, realisation, gauged.series, plan, spec.composition)
     )
-    return Compilation(spec, source, realisation, plan, program, gauge, clock.seconds)
+    program = clock.timed(
+        "program", lambda: build_program(source, realisation, plan, gauged, reached, solver=spec.solver, **described)
+    )
+    return Compilation(
+        spec, source, realisation, plan, program, gauged.gauge, clock.seconds, gauged=gauged, scheme=reached
+    )
 
 
 def _split(spec: Spec, source: System, order: int | None, described: Mapping[str, Any], clock: _Clock) -> Compilation:

@@ -28,6 +28,7 @@ from phigen.runtime.c_solver import CSolver
 from phigen.runtime.interface import Interface
 from phigen.runtime.numpy_solver import NumpySolver
 from phigen.runtime.solver import Solver
+from phigen.scheme.discretisation import hamilton_jacobi
 from phigen.series.hamilton_jacobi import graph_series
 from phigen.spec.model import Run
 from phigen.symbolic.expression import Expression, derivatives, fold, gradient, number, symbol, total
@@ -467,3 +468,8 @@ def write(folder: Path, texts: Mapping[str, str]) -> None:
     """Put files into a folder."""
     for name, text in texts.items():
         (folder / name).write_text(text, encoding="utf-8")
+
+
+def series_of(system, realisation, terms, static=()):
+    """S_1 … S_terms of a system in a tower."""
+    return hamilton_jacobi(system, realisation, terms, static).polynomial(terms)

@@ -30,7 +30,7 @@ def series_formulas(compilation: Compilation, most: int | None) -> tuple[list[tu
     """
     plan = stage_order(compilation)
     more = plan is compilation.order and plan.order <= _MODIFIED_UP_TO
-    series = compilation.series(plan.order + 1 if more else plan.terms)
+    series = compilation.series.polynomial(plan.order + 1 if more else plan.terms)
     listed = [(i, of_polynomial(series.tower, s, most)) for i, s in enumerate(series.terms[: plan.terms], 1) if s != 0]
     return listed, of_polynomial(series.tower, -series.terms[plan.order], most) if more else None
 

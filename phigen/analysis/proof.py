@@ -12,7 +12,6 @@ from phigen.geometry import checks
 from phigen.geometry.jacobi import jacobi_identity
 from phigen.geometry.system import System, system_from_spec
 from phigen.realisations import axioms
-from phigen.scheme.discretisation import formal_alpha
 from phigen.scheme.order import Order
 from phigen.series.hamilton_jacobi import residual
 from phigen.spec.model import Extras, Spec
@@ -142,9 +141,8 @@ def series_statements(compilation: Compilation) -> Iterator[Statement]:
     terms = plan.terms + (1 if realisation.symmetric else 0)  # S_{k+1} = 0 is what makes the order k + 1
     name = f"∂_t S_t = H(α(x, ∇S_t)) for S_t = {sum_of_terms(plan.terms)}"
     try:
-        series = compilation.series(terms)
-        alpha = formal_alpha(system, realisation, terms)
-        rest = residual(series, system.hamiltonian, alpha, system.coordinates)
+        series = compilation.series.polynomial(terms)
+        rest = residual(series, system.hamiltonian, compilation.series.alpha, system.coordinates)
     except OverflowError:
         yield Statement(name, UNDECIDED, "too many terms to expand; the recursion itself is used, unexpanded")
         return

@@ -5,8 +5,8 @@ from __future__ import annotations
 from phigen.geometry.shapes import LogCanonical
 from phigen.geometry.system import System
 from phigen.realisations.protocol import BiRealisation
-from phigen.scheme.discretisation import MOST_OPERATIONS, discretise, too_large
-from phigen.scheme.gauge import Gauge
+from phigen.scheme.discretisation import MOST_OPERATIONS, Discretisation, too_large
+from phigen.scheme.gauge import Gauged
 from phigen.scheme.gauge import kernels as gauge_kernels
 from phigen.scheme.generating import STEP
 from phigen.scheme.kernels import inverse, observables, path_kernels, step_kernels
@@ -34,9 +34,9 @@ def build_program(
     system: System,
     realisation: BiRealisation,
     order: Order,
+    gauged: Gauged,
+    scheme: Discretisation,
     *,
-    composition: str = "auto",
-    gauge: Gauge | None = None,
     solver: SolverOptions | None = None,
     extras: Extras = NO_EXTRAS,
     title: str = "",
@@ -45,9 +45,7 @@ def build_program(
 ) -> Program:
     """The solver of a system as a program. LimitError if a kernel exceeds `MOST_OPERATIONS`."""
     solver = solver or SolverOptions()
-    gauge = gauge or Gauge()
-    scheme = discretise(gauge.applied(system), realisation, order, composition, static=gauge.symbols)
-    generating = scheme.generating
+    gauge, generating = gauged.gauge, scheme.generating
     coefficients = generating.coefficients
     path = build_path(system, coefficients) if realisation.path else None
     slopes = None
@@ -66,7 +64,7 @@ def build_program(
         kernels["modified"] = modified_kernel(system, realisation, order, gauge, count, stages)
     varied = tangent_path(system, coefficients) if path and extras.tangent else None
     driver = "path" if path else "explicit" if "explicit" in kernels else "newton"
-    kernels |= observables(system) | gauge_kernels(system, realisation, gauge)
+    kernels |= observables(system) | gauge_kernels(system, gauged)
     prepare = Kernel(
         "prepare",
         "everything that depends on parameters and step size only",

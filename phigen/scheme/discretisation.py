@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 
 from phigen.errors import Diagnostic, LimitError, SpecError
@@ -12,7 +13,7 @@ from phigen.realisations.protocol import BiRealisation
 from phigen.scheme.composition import find, orders
 from phigen.scheme.generating import STEP, GeneratingFunction, collected_form, graph_form
 from phigen.scheme.order import Order
-from phigen.series.hamilton_jacobi import PolynomialSeries, graph_series, polynomial_series
+from phigen.series.hamilton_jacobi import HamiltonJacobi
 from phigen.spec.names import FLOW_COMPOSITIONS
 from phigen.symbolic.expression import Expression
 
@@ -34,35 +35,32 @@ def formal_alpha(system: System, realisation: BiRealisation, terms: int) -> tupl
     return tuple(karasev.series(system, terms - 1)) if realisation.path and terms > 1 else realisation.alpha
 
 
-def series_of(system: System, realisation: BiRealisation, terms: int, static: Sequence[str] = ()) -> PolynomialSeries:
-    """S_1 … S_terms in a tower that also contains the step size and other ``static`` symbols."""
-    return polynomial_series(
+def hamilton_jacobi(
+    system: System, realisation: BiRealisation, most: int, static: Sequence[str] = ()
+) -> HamiltonJacobi:
+    """The series of a system, whose tower also contains the step size and other ``static`` symbols.
+
+    Terms up to S_most will be asked for.
+    """
+    return HamiltonJacobi(
         system.hamiltonian,
-        formal_alpha(system, realisation, terms),
+        lambda terms: formal_alpha(system, realisation, terms),
         system.coordinates,
         [*system.parameter_names, *static, STEP],
-        terms,
+        most,
         symmetric=realisation.symmetric,
     )
 
 
-def generating_function(
-    system: System, realisation: BiRealisation, terms: int, extra: Sequence[str] = ()
-) -> GeneratingFunction:
+def generating_function(system: System, series: HamiltonJacobi, terms: int) -> GeneratingFunction:
     """∇S_h and Hess S_h in the cheapest form. LimitError if every form is too large."""
-    coordinates, symmetric = system.coordinates, realisation.symmetric
-    static = [*system.parameter_names, *extra]
     candidates = []
     if terms <= GRAPH_TERMS:
-        alpha = formal_alpha(system, realisation, terms)
-        graph = graph_series(system.hamiltonian, alpha, coordinates, terms, symmetric=symmetric)
-        candidates.append(graph_form(graph, coordinates, static))
+        candidates.append(graph_form(series.graph(terms), series.coordinates, series.static))
     worth = min((c.cost() for c in candidates), default=MOST_OPERATIONS)
-    try:
-        series = series_of(system, realisation, terms, extra)
-        candidates = [*collected_form(series, coordinates, static, worth), *candidates]
-    except OverflowError:
-        pass
+    with suppress(OverflowError):
+        collected = collected_form(series.polynomial(terms), series.coordinates, series.static, worth)
+        candidates = [*collected, *candidates]
     if not candidates or min(c.cost() for c in candidates) > MOST_OPERATIONS:
         raise too_large(system, f"S_1 … S_{terms} take more than {MOST_OPERATIONS} operations")
     return min(candidates, key=GeneratingFunction.cost)
@@ -79,45 +77,50 @@ class Discretisation:
 
 
 def discretise(
-    system: System, realisation: BiRealisation, order: Order, composition: str, static: Sequence[str] = ()
+    system: System,
+    realisation: BiRealisation,
+    series: HamiltonJacobi,
+    order: Order,
+    composition: str,
 ) -> Discretisation:
     """The direct series, or a symmetric composition of the method of order 2 where that was asked for or is cheaper.
 
     ``auto`` composes only if the direct series is beyond the budget or costs more than `DIRECT_WORTH` times
     the stages of a composition, since its error constant is much smaller.
     """
+    series.reach(order.order)  # S_{k+1} = 0 is what makes a symmetric method of order k + 1: it will be proved
     if composition not in ("auto", "none"):
-        return _composed(system, realisation, order, composition, static)
-    possible = composition == "auto" and realisation.symmetric and find("auto", order.order) is not None
+        return _composed(system, realisation, series, order, composition)
+    possible = composition == "auto" and series.symmetric and find("auto", order.order) is not None
     try:
-        direct = Discretisation(generating_function(system, realisation, order.terms, static), order.terms)
+        direct = Discretisation(generating_function(system, series, order.terms), order.terms)
     except LimitError:
         if not possible:
             raise
-        return _composed(system, realisation, order, "auto", static)
+        return _composed(system, realisation, series, order, "auto")
     if not possible or direct.generating.cost() < COMPOSE_ABOVE:
         return direct
-    composed = _composed(system, realisation, order, "auto", static)
+    composed = _composed(system, realisation, series, order, "auto")
     price = DIRECT_WORTH * len(composed.fractions) * (composed.generating.cost() + system.dimension**2)
     return composed if direct.generating.cost() > price else direct
 
 
 def _composed(
-    system: System, realisation: BiRealisation, order: Order, name: str, static: Sequence[str]
+    system: System, realisation: BiRealisation, series: HamiltonJacobi, order: Order, name: str
 ) -> Discretisation:
     found = find(name, order.order)
-    if found is None or not realisation.symmetric:
+    if found is None or not series.symmetric:
         reason = (
             f"composition {name} composes the parts of a splitting; it needs scheme: splitting"
             if name in FLOW_COMPOSITIONS
             else f"composition {name} offers the orders {orders(name)}, not {order.order}"
-            if realisation.symmetric
+            if series.symmetric
             else f"composition {name} needs a symmetric bi-realisation; {realisation.kind} is not"
         )
         place = system.locations.get(("composition",)) or system.locations.get(("order",))
         raise SpecError([Diagnostic(reason, place, "composition: none takes the series directly")])
     note = f"composition: {found.name}, {len(found.fractions)} stages of order 2"
-    return Discretisation(generating_function(system, realisation, 1, static), 1, found.fractions, note)
+    return Discretisation(generating_function(system, series, 1), 1, found.fractions, note)
 
 
 def too_large(system: System, reason: str) -> LimitError:

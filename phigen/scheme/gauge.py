@@ -14,8 +14,9 @@ from dataclasses import dataclass, field, replace
 from phigen.errors import Diagnostic, SpecError
 from phigen.geometry.system import System, hamiltonian_vector_field
 from phigen.realisations.protocol import BiRealisation
+from phigen.scheme.discretisation import hamilton_jacobi
 from phigen.scheme.program import Kernel, Output
-from phigen.series.hamilton_jacobi import PolynomialSeries, polynomial_series
+from phigen.series.hamilton_jacobi import HamiltonJacobi, PolynomialSeries
 from phigen.symbolic.expression import Expression, gradient, symbol, total
 
 #: Gauged series may have this many times the terms of the plain one; beyond, the gauge costs more than it gains.
@@ -56,23 +57,36 @@ class Gauge:
         return replace(system, hamiltonian=system.hamiltonian - total(parts)) if parts else system
 
 
-def choose(system: System, realisation: BiRealisation, setting: str | Mapping[str, Expression]) -> Gauge:
-    """The gauge of a setting: ``none``, ``auto``, or a value for some Casimirs.
+@dataclass(frozen=True)
+class Gauged:
+    """What is discretised: the system with H less the Casimirs of the gauge, and its Hamilton–Jacobi series."""
+
+    gauge: Gauge
+    system: System
+    series: HamiltonJacobi
+
+
+def choose(system: System, realisation: BiRealisation, setting: str | Mapping[str, Expression]) -> Gauged:
+    """The system in the gauge of a setting: ``none``, ``auto``, or a value for some Casimirs.
 
     ``auto`` frees a Casimir if S_3 depends on its λ (in log-canonical structures it never does) and has hardly
     more terms with it (on tops it has many more, for little).
     """
     if not isinstance(setting, str):
-        return given(system, setting)
+        return _gauged(system, realisation, given(system, setting))
+    chosen = plain = _gauged(system, realisation, Gauge())
     if setting == "none" or not realisation.exact or not realisation.symmetric:
-        return Gauge()
-    free: list[str] = []
-    plain = _guide(system, realisation, Gauge())
+        return plain
     for name in system.casimirs:
-        gauged = _guide(system, realisation, Gauge((*free, name)))
-        if gauged is not None and plain is not None and _worthwhile(plain, gauged, system, f"gauge:{name}"):
-            free.append(name)
-    return Gauge(tuple(free))
+        candidate = _gauged(system, realisation, Gauge((*chosen.gauge.free, name)))
+        if _worthwhile(plain, candidate, f"gauge:{name}"):
+            chosen = candidate
+    return chosen
+
+
+def _gauged(system: System, realisation: BiRealisation, gauge: Gauge) -> Gauged:
+    discretised = gauge.applied(system)
+    return Gauged(gauge, discretised, hamilton_jacobi(discretised, realisation, GUIDE, gauge.symbols))
 
 
 def given(system: System, values: Mapping[str, Expression]) -> Gauge:
@@ -85,28 +99,14 @@ def given(system: System, values: Mapping[str, Expression]) -> Gauge:
     return Gauge(fixed=values)
 
 
-def _guide(system: System, realisation: BiRealisation, gauge: Gauge) -> PolynomialSeries | None:
-    from phigen.scheme.discretisation import formal_alpha
-
-    gauged = gauge.applied(system)
+def _worthwhile(plain: Gauged, gauged: Gauged, name: str) -> bool:
     try:
-        return polynomial_series(
-            gauged.hamiltonian,
-            formal_alpha(gauged, realisation, GUIDE),
-            system.coordinates,
-            [*system.parameter_names, *gauge.symbols],
-            GUIDE,
-            symmetric=True,
-        )
+        before, after = (g.series.polynomial(GUIDE) for g in (plain, gauged))
     except OverflowError:
-        return None
-
-
-def _worthwhile(plain: PolynomialSeries, gauged: PolynomialSeries, system: System, name: str) -> bool:
-    if not gauged.tower.depends_on(gauged.terms[GUIDE - 1], [name]):
         return False
-    before, after = (_state_terms(s, system) for s in (plain, gauged))
-    return after <= MOST_GROWTH * before
+    if not after.tower.depends_on(after.terms[GUIDE - 1], [name]):
+        return False
+    return _state_terms(after, plain.system) <= MOST_GROWTH * _state_terms(before, plain.system)
 
 
 def _state_terms(series: PolynomialSeries, system: System) -> int:
@@ -116,11 +116,12 @@ def _state_terms(series: PolynomialSeries, system: System) -> int:
     return len({tuple(int(m[i]) for i in state) for s in series.terms for m in s.to_dict()})
 
 
-def kernels(system: System, realisation: BiRealisation, gauge: Gauge) -> dict[str, Kernel]:
+def kernels(system: System, gauged: Gauged) -> dict[str, Kernel]:
     """What the solver needs to choose λ: the error π∇S_3, and products of ∇H and the ∇C, which set the scale."""
-    series = _guide(system, realisation, gauge)
-    if not gauge.free or series is None:
+    gauge = gauged.gauge
+    if not gauge.free:
         return {}
+    series = gauged.series.polynomial(GUIDE)
     tower = series.tower
     slope = [tower.expression(tower.derivative(series.terms[GUIDE - 1], c)) for c in system.coordinates]
     h = gradient(system.hamiltonian, system.coordinates)

@@ -65,7 +65,7 @@ def collected_form(
         return []
     found = []
     for entrywise in (True, False):
-        table = Coefficients([*static, STEP])
+        table = Coefficients(static)
         slope = tuple(ring.expression(g, table) for g in first)
         if entrywise:
             hessian = _symmetric(
@@ -83,7 +83,7 @@ def graph_form(series: Sequence[Expression], coordinates: Sequence[str], static:
     s = total(h ** (i + 1) * term for i, term in enumerate(series) if not term.is_zero)
     slope = tuple(gradient(s, coordinates))
     rows = [gradient(slope[i], coordinates[i:]) for i in range(len(coordinates))]  # one reverse sweep a row
-    return GeneratingFunction(slope, _symmetric(rows), "shared graph", 0, Coefficients([*static, STEP]))
+    return GeneratingFunction(slope, _symmetric(rows), "shared graph", 0, Coefficients(static))
 
 
 def _differentiated(slope: Sequence[Expression], coordinates: Sequence[str]) -> tuple[tuple[Expression, ...], ...]:

@@ -10,9 +10,10 @@ The S_i of the paper (section 4, step 1) carry a further factor i!. In a symmetr
 
 from __future__ import annotations
 
-from collections.abc import Sequence, Sized
+from collections.abc import Callable, Sequence, Sized
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cached_property
 from typing import Any
 
 from phigen.symbolic.expression import ZERO, Expression, gradient, substitute
@@ -60,13 +61,8 @@ def polynomial_series(
 
     Raises `OverflowError` if a term has more than `MOST_TERMS` monomials.
     """
-    target = composed(hamiltonian, coordinates, alpha)
-    tower = series_tower(target, coordinates, parameters)
-
-    def slope(s: Poly) -> list[Poly]:
-        return [tower.derivative(s, c) for c in coordinates]
-
-    return PolynomialSeries(tower, tuple(_recursion(target, tower, coordinates, terms, symmetric, slope)))
+    recursion = _polynomial_recursion(hamiltonian, alpha, coordinates, parameters, symmetric)
+    return PolynomialSeries(recursion.ring, recursion.first(terms))
 
 
 def graph_series(
@@ -78,31 +74,115 @@ def graph_series(
     symmetric: bool,
 ) -> tuple[Expression, ...]:
     """S_1 … S_terms as one shared expression graph, never expanded."""
+    return _graph_recursion(hamiltonian, alpha, coordinates, symmetric).first(terms)
+
+
+class HamiltonJacobi:
+    """S_1, S_2, … of one Hamiltonian in one bi-realisation, computed as far as they are asked for, and once.
+
+    ``alpha`` gives the source map to the degree in p that so many terms need, for now for S_1 … S_most: see `reach`.
+    ``static`` are the parameters and the other symbols of the tower.
+    """
+
+    def __init__(
+        self,
+        hamiltonian: Expression,
+        alpha: Callable[[int], Sequence[Expression]],
+        coordinates: Sequence[str],
+        static: Sequence[str],
+        most: int,
+        *,
+        symmetric: bool,
+    ) -> None:
+        self.hamiltonian, self.coordinates, self.symmetric = hamiltonian, tuple(coordinates), symmetric
+        self.static = tuple(static)
+        self._source, self._most = alpha, most
+
+    @cached_property
+    def alpha(self) -> tuple[Expression, ...]:
+        """The source map that the terms are computed from."""
+        return tuple(self._source(self._most))
+
+    def polynomial(self, terms: int) -> PolynomialSeries:
+        """S_1 … S_terms in a tower. Raises `OverflowError` as `polynomial_series`."""
+        self.reach(terms)
+        return PolynomialSeries(self._polynomials.ring, self._polynomials.first(terms))
+
+    def graph(self, terms: int) -> tuple[Expression, ...]:
+        """S_1 … S_terms as one shared expression graph, never expanded."""
+        self.reach(terms)
+        return self._graphs.first(terms)
+
+    def reach(self, terms: int) -> None:
+        """So many terms will be asked for. Where α is a series in p this starts anew, so it is said in good time."""
+        if terms <= self._most:
+            return
+        self._most = terms
+        if tuple(self._source(terms)) != self.alpha:
+            for kept in ("alpha", "_polynomials", "_graphs"):
+                self.__dict__.pop(kept, None)
+
+    @cached_property
+    def _polynomials(self) -> _Recursion:
+        return _polynomial_recursion(self.hamiltonian, self.alpha, self.coordinates, self.static, self.symmetric)
+
+    @cached_property
+    def _graphs(self) -> _Recursion:
+        return _graph_recursion(self.hamiltonian, self.alpha, self.coordinates, self.symmetric)
+
+
+def _polynomial_recursion(
+    hamiltonian: Expression,
+    alpha: Sequence[Expression],
+    coordinates: Sequence[str],
+    parameters: Sequence[str],
+    symmetric: bool,
+) -> _Recursion:
     target = composed(hamiltonian, coordinates, alpha)
-
-    def slope(s: Expression) -> list[Expression]:
-        return gradient(s, coordinates)
-
-    return tuple(_recursion(target, ExpressionRing(), coordinates, terms, symmetric, slope))
+    tower = series_tower(target, coordinates, parameters)
+    return _Recursion(target, tower, coordinates, symmetric, lambda s: [tower.derivative(s, c) for c in coordinates])
 
 
-def _recursion(
-    target: Expression, ring: Any, coordinates: Sequence[str], terms: int, symmetric: bool, slope: Any
-) -> list[Any]:
-    momenta = [momentum(c) for c in coordinates]
-    taylor = Taylor([target], ring, momenta)
-    zero = ring.constant(0)
-    taylor.advance(dict.fromkeys(momenta, zero))
-    found = [taylor.coefficients(target)[0]]
-    while len(found) < terms:
-        i = len(found)
-        skip = symmetric and i % 2 == 0
-        taylor.advance(dict(zip(momenta, [zero] * len(momenta) if skip else slope(found[-1]), strict=True)))
-        even = symmetric and i % 2 == 1
-        if isinstance(found[-1], Sized) and len(found[-1]) > MOST_TERMS:
-            raise OverflowError(f"S_{i} has {len(found[-1])} terms")
-        found.append(zero if even else taylor.coefficients(target)[i] * ring.constant(Fraction(1, i + 1)))
-    return found
+def _graph_recursion(
+    hamiltonian: Expression, alpha: Sequence[Expression], coordinates: Sequence[str], symmetric: bool
+) -> _Recursion:
+    target = composed(hamiltonian, coordinates, alpha)
+    return _Recursion(target, ExpressionRing(), coordinates, symmetric, lambda s: gradient(s, coordinates))
+
+
+class _Recursion:
+    """The recursion in a ring, one term after the other: ``target`` is H(α(x, p)), ``slope`` the gradient of a term."""
+
+    def __init__(self, target: Expression, ring: Any, coordinates: Sequence[str], symmetric: bool, slope: Any) -> None:
+        self.ring = ring
+        self._target, self._symmetric, self._slope = target, symmetric, slope
+        self._momenta = [momentum(c) for c in coordinates]
+        self._taylor = Taylor([target], ring, self._momenta)
+        self._zero = ring.constant(0)
+        self._found: list[Any] = []
+        self._overflow: OverflowError | None = None
+
+    def first(self, terms: int) -> tuple[Any, ...]:
+        """S_1 … S_terms. An `OverflowError` is final: what is asked for beyond the last good term raises it again."""
+        while len(self._found) < terms:
+            if self._overflow:
+                raise self._overflow
+            try:
+                self._found.append(self._next())
+            except OverflowError as error:
+                self._overflow = error
+        return tuple(self._found[:terms])
+
+    def _next(self) -> Any:
+        i, even = len(self._found), self._symmetric and len(self._found) % 2 == 1
+        moves = i > 0 and not (self._symmetric and i % 2 == 0)
+        slopes = self._slope(self._found[-1]) if moves else [self._zero] * len(self._momenta)
+        self._taylor.advance(dict(zip(self._momenta, slopes, strict=True)))
+        if i and isinstance(self._found[-1], Sized) and len(self._found[-1]) > MOST_TERMS:
+            raise OverflowError(f"S_{i} has {len(self._found[-1])} terms")
+        if even:
+            return self._zero
+        return self._taylor.coefficients(self._target)[i] * self.ring.constant(Fraction(1, i + 1))
 
 
 def residual(

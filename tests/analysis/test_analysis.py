@@ -6,13 +6,13 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from scipy.integrate import DOP853
+from support import series_of
 
 from phigen import resources, spec
 from phigen.analysis import arrays, classical, dop853, formulas, summary
 from phigen.compiler import compile_file
 from phigen.geometry.system import system_from_spec
 from phigen.realisations.catalogue import realise
-from phigen.scheme.discretisation import series_of
 from phigen.spec.model import BirealisationChoice
 from phigen.spec.names import SPEC_FUNCTIONS
 from phigen.symbolic.expression import FUNCTIONS, PI, call, number, power, symbol, text

@@ -120,12 +120,9 @@ def test_a_wrong_sign_of_the_quadratic_term_is_found_out():
     compilation = compilation_of()
     names = {f"p:{c}": -symbol(f"p:{c}") for c in compilation.system.coordinates}
     wrong = tuple(-e for e in substitute(compilation.realisation.displacement, names))
-    program = build_program(
-        compilation.system,
-        replace(compilation.realisation, displacement=wrong),
-        compilation.order,
-        extras=Extras(tangent=True),
-    )
+    realisation = replace(compilation.realisation, displacement=wrong)
+    found = (compilation.system, realisation, compilation.order, compilation.gauged, compilation.scheme)
+    program = build_program(*found, extras=Extras(tangent=True))
     bad = replace(compilation, program=program)
     found = verified(bad, {"numpy": from_source(bad)})
     assert {"Poisson defect, exact tangent", "observed order"} <= failed(found)

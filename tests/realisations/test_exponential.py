@@ -6,13 +6,13 @@ from fractions import Fraction
 import mpmath
 import pytest
 from geometry.building import family, system, typed
+from support import series_of
 
 from phigen.errors import SpecError
 from phigen.geometry.system import hamiltonian_vector_field
 from phigen.realisations import exponential
 from phigen.realisations.axioms import check
 from phigen.realisations.catalogue import realise
-from phigen.scheme.discretisation import series_of
 from phigen.spec.model import BirealisationChoice
 from phigen.symbolic.expression import call, gradient, number, symbol, symbols_of, total
 from phigen.symbolic.numeric import evaluate_precisely

@@ -2,12 +2,12 @@
 
 import mpmath
 import pytest
-from support import BODY, NAMES, compile_text, compiled, values
+from support import BODY, NAMES, compile_text, compiled, series_of, values
 
 from phigen.errors import LimitError
 from phigen.scheme import assemble, discretisation
 from phigen.scheme.collected import collect
-from phigen.scheme.discretisation import GRAPH_TERMS, generating_function, series_of
+from phigen.scheme.discretisation import GRAPH_TERMS, generating_function, hamilton_jacobi
 from phigen.scheme.generating import STEP, collected_form, graph_form
 from phigen.scheme.order import Order, plan_order
 from phigen.scheme.staging import Coefficients
@@ -52,16 +52,18 @@ def test_rounding_up_is_said():
 def test_generating_function_is_the_cheapest_of_its_forms_and_all_are_equal(name):
     compilation = compiled(name)
     system, realisation, terms = compilation.system, compilation.realisation, compilation.order.terms
-    coordinates, static = system.coordinates, system.parameter_names
-    chosen = generating_function(system, realisation, terms)
-    forms = list(collected_form(series_of(system, realisation, terms), coordinates, static, 10**6))
+    coordinates, series = system.coordinates, hamilton_jacobi(system, realisation, terms)
+    chosen = generating_function(system, series, terms)
+    forms = list(collected_form(series.polynomial(terms), coordinates, series.static, 10**6))
     if terms <= GRAPH_TERMS:
         symmetric = realisation.symmetric
         graph = graph_series(system.hamiltonian, realisation.alpha, coordinates, terms, symmetric=symmetric)
-        forms.append(graph_form(graph, coordinates, static))
+        forms.append(graph_form(graph, coordinates, series.static))
     assert chosen.cost() == min(f.cost() for f in forms)
     with mpmath.workdps(40):
-        at = {c: mpmath.mpf(7 + k) / 11 for k, c in enumerate([*coordinates, *static])} | {STEP: mpmath.mpf(1) / 8}
+        at = {c: mpmath.mpf(7 + k) / 11 for k, c in enumerate([*coordinates, *system.parameter_names])} | {
+            STEP: mpmath.mpf(1) / 8
+        }
         found = [evaluated(form, at) for form in forms]
         for other in found[1:]:
             assert all(abs(u - v) <= mpmath.mpf(10) ** -25 * (1 + abs(u)) for u, v in zip(found[0], other, strict=True))

@@ -6,9 +6,8 @@ from fractions import Fraction
 import mpmath
 import pytest
 import sympy
-from support import BODY, NAMES, SPECIES, compile_text, compiled, symbols, values
+from support import BODY, NAMES, SPECIES, compile_text, compiled, series_of, symbols, values
 
-from phigen.scheme.discretisation import series_of
 from phigen.series.hamilton_jacobi import graph_series, polynomial_series, residual
 from phigen.symbolic.expression import ONE, PI, ZERO, Expression, call, number, power, sqrt, symbol
 from phigen.symbolic.tower import Tower

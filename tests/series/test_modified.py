@@ -7,12 +7,12 @@ from fractions import Fraction
 import mpmath
 import numpy as np
 import pytest
-from support import BODY, PreciseStep, compile_text, compiled, precisely, setting, solver, values
+from support import BODY, PreciseStep, compile_text, compiled, precisely, series_of, setting, solver, values
 
 from phigen.analysis.arrays import evaluate
 from phigen.compiler import compile_spec
 from phigen.realisations import karasev
-from phigen.scheme.discretisation import formal_alpha, series_of
+from phigen.scheme.discretisation import formal_alpha
 from phigen.series.modified import modified_series, time_dependent
 from phigen.symbolic.tower import rational
 
