@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from phigen.analysis.formulas import readable
 from phigen.compiler import Compilation
+from phigen.scheme.steps import Splitting, Step
 from phigen.splitting.flow import Flow
 from phigen.symbolic.expression import Expression, symbol
 
@@ -37,6 +38,13 @@ def formulas(compilation: Compilation, most: int | None) -> list[tuple[str, str]
     return listed
 
 
+def schedule(step: Step) -> list[tuple[int, float]]:
+    """The flows of a splitting in order, as pairs of a part and a fraction of the step; none for other steps."""
+    if not isinstance(step, Splitting):
+        return []
+    return [(part, step.schedule.times[row]) for part, row in step.schedule.flows]
+
+
 def described(compilation: Compilation) -> dict[str, object]:
     """The parts, and the flows of a step as pairs of a part, counted from 1, and a fraction of the step."""
     parts = []
@@ -44,6 +52,5 @@ def described(compilation: Compilation) -> dict[str, object]:
         moved = images(flow, compilation.system.coordinates)
         part, *texts = readable([flow.hamiltonian, *moved.values()], None)
         parts.append({"hamiltonian": part, "flow": dict(zip(moved, texts, strict=True)), "manner": flow.manner})
-    schedule = compilation.program.schedule
-    steps = [[part + 1, schedule.times[row]] for part, row in schedule.flows] if schedule else []
+    steps = [[part + 1, time] for part, time in schedule(compilation.program.step)]
     return {"scheme": "splitting", "parts": parts, "flows": steps}

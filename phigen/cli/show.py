@@ -170,9 +170,9 @@ def _power(exponent: int) -> str:
 
 def _code(compilation: Compilation) -> list[str]:
     program = compilation.program
-    lines = [fact for fact in program.facts if not fact.startswith("bi-realisation")]
-    counts = ", ".join(f"{n} {what}" for what, n in program.operations.items() if n)
-    lines.append(f"operations of one {program.driver_unit}: {counts}")
+    lines = [fact for fact in program.about.facts if not fact.startswith("bi-realisation")]
+    counts = ", ".join(f"{n} {what}" for what, n in program.about.operations.items() if n)
+    lines.append(f"operations of one {program.step.unit}: {counts}")
     return lines + [f"{name}: {len(text.splitlines())} lines" for name, text in _files(compilation).items()]
 
 
@@ -202,7 +202,7 @@ def _described(compilation: Compilation) -> dict[str, object]:
         "invariants": dict(_named(system.invariants, None)),
         "order": plan.order,
         **(flows.described(compilation) if compilation.splitting else _described_series(compilation)),
-        "operations": dict(compilation.program.operations),
+        "operations": dict(compilation.program.about.operations),
         "files": {name: len(text.encode()) for name, text in _files(compilation).items()},
     }
 

@@ -47,14 +47,14 @@ def choices_section(compilation: Compilation) -> Markup:
         ),
         ("order", str(compilation.order.order) + (f", {compilation.order.note}" if compilation.order.note else "")),
     ]
-    for fact in program.facts:
+    for fact in program.about.facts:
         name, colon, text = fact.partition(": ")
         if colon and name != "bi-realisation":
             pairs.append((name, text))
         elif not colon:
             pairs.append(("note", fact))
-    counts = ", ".join(f"{n} {what}" for what, n in program.operations.items() if n)
-    pairs.append((f"one {program.driver_unit}", counts or "nothing to compute"))
+    counts = ", ".join(f"{n} {what}" for what, n in program.about.operations.items() if n)
+    pairs.append((f"one {program.step.unit}", counts or "nothing to compute"))
     return page.facts((name, page.typeset(text)) for name, text in pairs)
 
 

@@ -9,6 +9,7 @@ from phigen.compiler import Compilation
 from phigen.report import page
 from phigen.report.equations import equation, group, polynomial
 from phigen.report.known import ALPHA_BETA_OF_A_PATH, BETA_OF_ALPHA, GAUGED, MODIFIED, PATH_STEP, PHI, STEP
+from phigen.scheme.steps import Step
 from phigen.splitting.flow import Flow
 
 #: A step of more flows is folded.
@@ -76,7 +77,7 @@ def _splitting(compilation: Compilation) -> list[Markup]:
     blocks.append(page.equations([[mathml.math(f"<mi>H</mi><mo>=</mo>{sum_of_parts}")]]))
     for k, flow in enumerate(parts, 1):
         blocks += _flow(compilation, k, flow)
-    return [*blocks, _schedule(compilation)]
+    return [*blocks, _schedule(compilation.program.step)]
 
 
 def _flow(compilation: Compilation, k: int, flow: Flow) -> list[Markup]:
@@ -87,14 +88,11 @@ def _flow(compilation: Compilation, k: int, flow: Flow) -> list[Markup]:
     return [part, images, page.paragraph(f"This flow: {flow.manner}.", "note")] if moved else [part]
 
 
-def _schedule(compilation: Compilation) -> Markup:
+def _schedule(step: Step) -> Markup:
     """The flows of one step, in their order."""
-    schedule = compilation.program.schedule
-    made = schedule.flows if schedule else ()
     rows = [
-        (str(i), [("", page.typeset(f"H_{part + 1}")), ("number", f"{schedule.times[row]:.16g}".replace("-", "−"))])
-        for i, (part, row) in enumerate(made, 1)
-        if schedule
+        (str(i), [("", page.typeset(f"H_{part + 1}")), ("number", f"{time:.16g}".replace("-", "−"))])
+        for i, (part, time) in enumerate(flows.schedule(step), 1)
     ]
     table = page.table("One step", [("", ""), ("", "flow of"), ("number", "over this part of h")], rows)
     return table if len(rows) <= FLOWS else page.fold(f"The {len(rows)} flows of one step", table)

@@ -2,28 +2,34 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 from phigen.geometry.shapes import LogCanonical
 from phigen.geometry.system import System
 from phigen.realisations.protocol import BiRealisation
 from phigen.scheme.discretisation import MOST_OPERATIONS, Discretisation, too_large
-from phigen.scheme.gauge import Gauged
-from phigen.scheme.gauge import kernels as gauge_kernels
-from phigen.scheme.generating import STEP
-from phigen.scheme.kernels import inverse, observables, path_kernels, step_kernels
+from phigen.scheme.gauge import Gauge, Gauged, free_gauge
+from phigen.scheme.generating import STEP, GeneratingFunction
+from phigen.scheme.kernel import Kernel, Output
+from phigen.scheme.kernels import (
+    explicit_kernel,
+    generate_kernel,
+    inverse,
+    linearise_kernel,
+    newton_solvers,
+    observables,
+    path_elimination,
+)
 from phigen.scheme.lowering import cost, operation_counts
 from phigen.scheme.mean import along_mean
-from phigen.scheme.modified import modified_kernel
+from phigen.scheme.modified import modified_of
 from phigen.scheme.order import Order
 from phigen.scheme.path import build_path, build_slopes
-from phigen.scheme.program import Kernel, Output, Program
-from phigen.scheme.tangent import curvature, tangent_kernels, tangent_path
+from phigen.scheme.program import About, Program
+from phigen.scheme.staging import Coefficients
+from phigen.scheme.steps import Explicit, InnerSolve, Newton, Path, PathLanes, PathTangent, Step
+from phigen.scheme.tangent import curvature, explicit_jacobian, tangent_path
 from phigen.spec.model import NO_EXTRAS, Extras, SolverOptions
-
-DRIVERS = {
-    "explicit": "explicit",
-    "newton": "implicit, Newton iteration with the analytic matrix",
-    "path": "implicit in p, each path followed by its Taylor series to round-off",
-}
 
 #: Largest dimension in which paths are followed in lanes. In five and six their derivatives cost what lanes save:
 #: measured, blocks take 0.6 to 1.9 times as long as single steps.
@@ -45,69 +51,101 @@ def build_program(
 ) -> Program:
     """The solver of a system as a program. LimitError if a kernel exceeds `MOST_OPERATIONS`."""
     solver = solver or SolverOptions()
-    gauge, generating = gauged.gauge, scheme.generating
+    gauge = gauged.gauge
+    step = _step(system, realisation, scheme.generating, gauge, solver, extras)
+    modified, count = None, extras.modified_hamiltonian
+    if count:
+        modified = modified_of(system, realisation, order, gauge, count, len(scheme.fractions))
+    for kernel in (step.prepare, step.main, *([modified.kernel] if modified else [])):
+        _within_budget(kernel, system)
+    return Program(
+        name=system.name,
+        about=About(
+            title,
+            licence,
+            spec_sha256,
+            tuple(fact for fact in _facts(realisation, scheme, gauge, step, order) if fact),
+            operation_counts(step.main.roots),
+        ),
+        coordinates=system.coordinates,
+        parameters=system.parameters,
+        casimirs=tuple(system.casimirs),
+        order=order.order,
+        step=step,
+        observables=observables(system),
+        fractions=scheme.fractions,
+        gauge=free_gauge(system, gauged),
+        modified=modified,
+        extras=extras,
+        lanes=solver.lanes,
+    )
+
+
+def _step(
+    system: System,
+    realisation: BiRealisation,
+    generating: GeneratingFunction,
+    gauge: Gauge,
+    solver: SolverOptions,
+    extras: Extras,
+) -> Newton | Explicit | Path:
+    inner = InnerSolve(
+        solver.max_iterations,
+        1e-20 if solver.tolerance is None else float(solver.tolerance),
+        isinstance(system.shape, LogCanonical),
+    )
+    if realisation.path:
+        return _path(system, generating, gauge, inner, lanes=solver.lanes, tangent=extras.tangent)
     coefficients = generating.coefficients
-    path = build_path(system, coefficients) if realisation.path else None
-    slopes = None
-    if path:
-        kernels = path_kernels(system, generating, coefficients)
-        if solver.lanes and system.dimension <= MOST_IN_LANES:
-            slopes = build_slopes(system, coefficients)
-            kernels["curvature"] = curvature(system, generating, coefficients)
-            kernels |= {"along_mean": along_mean(system.dimension), "invert": inverse(system.dimension)}
-    else:
-        kernels = step_kernels(system, realisation, generating, coefficients)
-    if extras.tangent:
-        kernels |= tangent_kernels(system, kernels, generating, coefficients)
-    if extras.modified_hamiltonian:
-        count, stages = extras.modified_hamiltonian, len(scheme.fractions)
-        kernels["modified"] = modified_kernel(system, realisation, order, gauge, count, stages)
-    varied = tangent_path(system, coefficients) if path and extras.tangent else None
-    driver = "path" if path else "explicit" if "explicit" in kernels else "newton"
-    kernels |= observables(system) | gauge_kernels(system, gauged)
-    prepare = Kernel(
+    increment = explicit_kernel(system, realisation, generating, coefficients)
+    if increment is None:
+        linearise = linearise_kernel(system, realisation, generating, coefficients)
+        solvers = newton_solvers(linearise)
+        prepare = _prepare(system, gauge, coefficients)
+        return Newton(prepare, linearise, inner, solvers.eliminate, solvers.invert, solvers.factors)
+    tangent = explicit_jacobian(increment, system.coordinates, coefficients) if extras.tangent else None
+    return Explicit(_prepare(system, gauge, coefficients), increment, tangent)
+
+
+def _path(
+    system: System, generating: GeneratingFunction, gauge: Gauge, inner: InnerSolve, *, lanes: bool, tangent: bool
+) -> Path:
+    n, coefficients = system.dimension, generating.coefficients
+    recurrences = build_path(system, coefficients)
+    generate = generate_kernel(system, generating, coefficients)
+    several, varied = None, None
+    if lanes and n <= MOST_IN_LANES:
+        slopes = build_slopes(system, coefficients)
+        several = PathLanes(slopes, curvature(system, generating, coefficients), along_mean(n), inverse(n))
+    if tangent:
+        kernel = several.curvature if several else curvature(system, generating, coefficients)
+        varied = PathTangent(tangent_path(system, coefficients), kernel)
+    prepare = _prepare(system, gauge, coefficients)
+    return Path(prepare, recurrences, generate, inner, path_elimination(n), several, varied)
+
+
+def _prepare(system: System, gauge: Gauge, coefficients: Coefficients) -> Kernel:
+    """All coefficients; the last kernel to be made, when the table is full."""
+    return Kernel(
         "prepare",
         "everything that depends on parameters and step size only",
         {"params": system.parameter_names, **gauge.inputs, "h": (STEP,)},
         (Output("coef", tuple(coefficients.values)),),
     )
-    main = kernels[{"path": "generate", "newton": "linearise"}.get(driver, driver)]
-    for kernel in (prepare, main, *(kernels[k] for k in ("modified",) if k in kernels)):
-        _within_budget(kernel, system)
-    facts = [
-        f"bi-realisation: {realisation.kind}, {'symmetric' if realisation.symmetric else 'not symmetric'}",
-        *approximation(realisation),
-        f"generating function: {'S_1' if scheme.terms == 1 else f'S_1 ... S_{scheme.terms}'} ({generating.form}"
-        + (f", {generating.terms} terms)" if generating.terms else ")"),
-        *gauge.facts,
-        f"step: {DRIVERS[driver]}",
-    ]
-    return Program(
-        name=system.name,
-        title=title,
-        coordinates=system.coordinates,
-        parameters=system.parameters,
-        casimirs=tuple(system.casimirs),
-        order=order.order,
-        driver=driver,
-        coefficients=len(coefficients.values),
-        kernels={"prepare": prepare, **kernels},
-        path=path,
-        path_slopes=slopes,
-        gauge=gauge.free,
-        extras=extras,
-        tangent_path=varied,
-        fractions=scheme.fractions,
-        relative=isinstance(system.shape, LogCanonical),
-        symmetric=realisation.symmetric,
-        max_iterations=solver.max_iterations,
-        lanes=solver.lanes,
-        tolerance=1e-20 if solver.tolerance is None else float(solver.tolerance),
-        license=licence,
-        spec_sha256=spec_sha256,
-        facts=tuple(fact for fact in (*facts, scheme.note, order.note) if fact),
-        operations=operation_counts(main.roots),
-    )
+
+
+def _facts(realisation: BiRealisation, scheme: Discretisation, gauge: Gauge, step: Step, order: Order) -> Iterator[str]:
+    """The lines of the header; some may be empty."""
+    generating = scheme.generating
+    series = "S_1" if scheme.terms == 1 else f"S_1 ... S_{scheme.terms}"
+    terms = f", {generating.terms} terms" if generating.terms else ""
+    yield f"bi-realisation: {realisation.kind}, {'symmetric' if realisation.symmetric else 'not symmetric'}"
+    yield from approximation(realisation)
+    yield f"generating function: {series} ({generating.form}{terms})"
+    yield from gauge.facts
+    yield f"step: {step.manner}"
+    yield scheme.note
+    yield order.note
 
 
 def approximation(realisation: BiRealisation) -> list[str]:

@@ -1,6 +1,6 @@
 """Gaussian elimination without pivoting, unrolled, for matrices of a known pattern of zeros.
 
-The Newton matrix is I + O(h), so its pivots are near 1; the driver watches them and falls back to elimination with
+The Newton matrix is I + O(h), so its pivots are near 1; the step watches them and falls back to elimination with
 pivoting. The order of the pivots, all on the diagonal, is that of least degree (Markowitz), which keeps the factors of
 lattices and trees as sparse as the matrix.
 """

@@ -15,7 +15,8 @@ from phigen.errors import Diagnostic, SpecError
 from phigen.geometry.system import System, hamiltonian_vector_field
 from phigen.realisations.protocol import BiRealisation
 from phigen.scheme.discretisation import hamilton_jacobi
-from phigen.scheme.program import Kernel, Output
+from phigen.scheme.kernel import Kernel, Output
+from phigen.scheme.program import FreeGauge
 from phigen.series.hamilton_jacobi import HamiltonJacobi, PolynomialSeries
 from phigen.symbolic.expression import Expression, gradient, symbol, total
 
@@ -116,11 +117,11 @@ def _state_terms(series: PolynomialSeries, system: System) -> int:
     return len({tuple(int(m[i]) for i in state) for s in series.terms for m in s.to_dict()})
 
 
-def kernels(system: System, gauged: Gauged) -> dict[str, Kernel]:
+def free_gauge(system: System, gauged: Gauged) -> FreeGauge | None:
     """What the solver needs to choose λ: the error π∇S_3, and products of ∇H and the ∇C, which set the scale."""
     gauge = gauged.gauge
     if not gauge.free:
-        return {}
+        return None
     series = gauged.series.polynomial(GUIDE)
     tower = series.tower
     slope = [tower.expression(tower.derivative(series.terms[GUIDE - 1], c)) for c in system.coordinates]
@@ -129,17 +130,16 @@ def kernels(system: System, gauged: Gauged) -> dict[str, Kernel]:
     for name in gauge.free:
         c = gradient(system.casimirs[name], system.coordinates)
         products += [total(a * b for a, b in zip(h, c, strict=True)), total(b * b for b in c)]
-    return {
-        "guide": Kernel(
-            "guide",
-            "the leading error vector pi grad S_3, as a function of the gauge",
-            {"params": system.parameter_names, **gauge.inputs, "x": system.coordinates},
-            (Output("error", hamiltonian_vector_field(system.poisson, slope)),),
-        ),
-        "products": Kernel(
-            "products",
-            "grad H . grad H, then grad H . grad C and grad C . grad C for each Casimir of the gauge",
-            {"params": system.parameter_names, "x": system.coordinates},
-            (Output("out", tuple(products)),),
-        ),
-    }
+    guide = Kernel(
+        "guide",
+        "the leading error vector pi grad S_3, as a function of the gauge",
+        {"params": system.parameter_names, **gauge.inputs, "x": system.coordinates},
+        (Output("error", hamiltonian_vector_field(system.poisson, slope)),),
+    )
+    scale = Kernel(
+        "products",
+        "grad H . grad H, then grad H . grad C and grad C . grad C for each Casimir of the gauge",
+        {"params": system.parameter_names, "x": system.coordinates},
+        (Output("out", tuple(products)),),
+    )
+    return FreeGauge(gauge.free, guide, scale)

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from phigen.scheme.elimination import inversion
-from phigen.scheme.program import Kernel, Output
+from phigen.scheme.kernel import Kernel, Output
 from phigen.scheme.step import Matrix
 from phigen.symbolic.expression import ONE, ZERO, Expression, substitute, symbol, total
 

@@ -11,8 +11,9 @@ from phigen.realisations.protocol import BiRealisation
 from phigen.scheme.discretisation import formal_alpha, too_large
 from phigen.scheme.gauge import Gauge
 from phigen.scheme.generating import STEP
+from phigen.scheme.kernel import Kernel, Output
 from phigen.scheme.order import Order
-from phigen.scheme.program import Kernel, Output
+from phigen.scheme.program import Modified
 from phigen.series.modified import ModifiedSeries, modified_series
 from phigen.symbolic.expression import Expression, number, substitute
 
@@ -75,15 +76,16 @@ def expect_modified(system: System, realisation: BiRealisation, stages: int) -> 
         raise SpecError([Diagnostic(f"modified_hamiltonian is not offered for {why}", place)])
 
 
-def modified_kernel(
+def modified_of(
     system: System, realisation: BiRealisation, order: Order, gauge: Gauge, count: int, stages: int
-) -> Kernel:
-    """The kernel ``modified``. Raises `SpecError` where `expect_modified` does."""
+) -> Modified:
+    """The modified Hamiltonian as a kernel. Raises `SpecError` where `expect_modified` does."""
     expect_modified(system, realisation, stages)
     value = modified_hamiltonian(system, realisation, order, count, gauge)
-    return Kernel(
+    kernel = Kernel(
         "modified",
         f"the Hamiltonian whose flow the step is, with {count} corrections",
         {"params": system.parameter_names, **gauge.inputs, "h": (STEP,), "x": system.coordinates},
         (Output("energy", (value,)),),
     )
+    return Modified(kernel, order.order + (2 if realisation.symmetric else 1) * count)

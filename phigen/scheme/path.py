@@ -49,8 +49,8 @@ class Series:
 
 
 @dataclass(frozen=True)
-class Path:
-    """The recurrences: series 0 … n−1 are the coordinates m_i, ``slopes[i]`` is the series of ṁ_i.
+class Recurrences:
+    """A path as recurrences: series 0 … n−1 are the coordinates m_i, ``slopes[i]`` is the series of ṁ_i.
 
     ``fixed`` are values that stay constant along a path (functions of p and the coefficients), symbols ``f:i``.
     """
@@ -82,7 +82,7 @@ class PathSlopes:
     tensor: tuple[Entry, ...]
 
 
-def build_path(system: System, coefficients: Coefficients) -> Path:
+def build_path(system: System, coefficients: Coefficients) -> Recurrences:
     """The recurrences of ṁ = π(m)p; values that depend on parameters only go to the table."""
     return path_of(system.coordinates, _flow(system, coefficients))
 
@@ -105,7 +105,7 @@ def _apart(roots: Sequence[Expression], n: int) -> tuple[Sequence[Expression], .
     return roots[:n], roots[n : n + n * n], roots[n + n * n :]
 
 
-def path_of(coordinates: Sequence[str], flow: Sequence[Expression]) -> Path:
+def path_of(coordinates: Sequence[str], flow: Sequence[Expression]) -> Recurrences:
     """The recurrences of ṁ = flow(m, p), where p stays constant along the path."""
     return _Builder(coordinates).path(_chains(flow))
 
@@ -133,10 +133,10 @@ class _Builder:
         self._fixed_of: dict[int, Expression] = {}
         self._keep: list[Expression] = []
 
-    def path(self, flow: Sequence[Expression]) -> Path:
+    def path(self, flow: Sequence[Expression]) -> Recurrences:
         self._include(flow)
         slopes = tuple(self._as_series(f) for f in flow)  # may add series
-        return Path(tuple(self.series), slopes, tuple(self.fixed))
+        return Recurrences(tuple(self.series), slopes, tuple(self.fixed))
 
     def slopes(
         self, flow: Sequence[Expression], jacobian: Sequence[Expression], tensor: Sequence[Expression]

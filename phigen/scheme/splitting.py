@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
 
 from phigen.errors import Diagnostic, SpecError
 from phigen.geometry.system import System
-from phigen.scheme.alternation import Schedule
 from phigen.scheme.choosing import Choice
 from phigen.scheme.discretisation import MOST_OPERATIONS, too_large
 from phigen.scheme.gathering import gather
 from phigen.scheme.gauge import Gauge
+from phigen.scheme.kernel import Kernel, Output
 from phigen.scheme.kernels import observables
 from phigen.scheme.lowering import cost, operation_counts
-from phigen.scheme.program import Kernel, Output, Program
+from phigen.scheme.program import About, Program
 from phigen.scheme.staging import Coefficients
+from phigen.scheme.steps import Splitting
 from phigen.scheme.tangent import explicit_jacobian
 from phigen.spec.model import NO_EXTRAS, Extras
 from phigen.splitting.flow import Flow
@@ -38,55 +38,49 @@ def build_splitting(
     _expect_no_modified(system, extras)
     splitting, steps = choice.splitting, choice.schedule()
     coefficients = Coefficients([*system.parameter_names, TIME, KICK])
-    kernels = {}
-    for k, flow in enumerate(splitting.flows, 1):
-        kernels[f"flow{k}"] = _flow_kernel(system, flow, k, coefficients)
-    if extras.tangent:
-        for k in range(1, len(splitting.flows) + 1):
-            explicit = kernels[f"flow{k}"]
-            kernels[f"tangent{k}"] = explicit_jacobian(explicit, system.coordinates, coefficients, f"tangent{k}")
+    flows = tuple(_flow_kernel(system, flow, k, coefficients) for k, flow in enumerate(splitting.flows, 1))
+    tangents = tuple(
+        explicit_jacobian(flow, system.coordinates, coefficients, f"tangent{k}")
+        for k, flow in enumerate(flows, 1)
+        if extras.tangent
+    )
     prepare = Kernel(
         "prepare",
         "everything that depends on parameters and the time of a flow only",
         {"params": system.parameter_names, "h": (TIME,), **({"kick": (KICK,)} if steps.multiples else {})},
         (Output("coef", tuple(coefficients.values)),),
     )
-    for kernel in (prepare, *kernels.values()):
+    step = Splitting(prepare, flows, steps, choice.method.name, tangents)
+    for kernel in step.kernels:
         operations = cost(kernel.roots)
         if operations > MOST_OPERATIONS:
             raise too_large(system, f"{kernel.name} would take {operations} operations, more than {MOST_OPERATIONS}")
+    said = (*gauge.facts, *facts(choice, step), choice.order.note)
     return Program(
         name=system.name,
-        title=title,
+        about=About(title, licence, spec_sha256, tuple(fact for fact in said if fact), _operations(step)),
         coordinates=system.coordinates,
         parameters=system.parameters,
         casimirs=tuple(system.casimirs),
         order=choice.order.order,
-        driver="splitting",
-        coefficients=len(coefficients.values) * len(steps.times),
-        kernels={"prepare": prepare, **kernels, **observables(system)},
-        schedule=steps,
-        composition=choice.method.name,
+        step=step,
+        observables=observables(system),
         extras=extras,
-        license=licence,
-        spec_sha256=spec_sha256,
         lanes=lanes,
-        facts=tuple(fact for fact in (*gauge.facts, *facts(choice, steps), choice.order.note) if fact),
-        operations=_operations([kernels[f"flow{k}"] for k in range(1, len(splitting.flows) + 1)], steps),
     )
 
 
-def facts(choice: Choice, steps: Schedule) -> list[str]:
+def facts(choice: Choice, step: Splitting) -> list[str]:
     """What the header says of the method."""
-    count, method = len(choice.splitting.flows), choice.method
+    count, flows, method = len(step.flows), len(step.schedule.flows), choice.method
     if count == 1:
-        return ["scheme: the exact flow of H, which is elementary", "step: explicit"]
+        return ["scheme: the exact flow of H, which is elementary", f"step: {step.manner}"]
     parts = " + ".join(f"H_{k}" for k in range(1, count + 1))
     why = f", since {choice.why}" if choice.why else ""
     return [
         f"scheme: splitting, H = {parts}, with the exact flow of each",
-        f"composition: {method.name}, {method.stages} stage{'s' * (method.stages > 1)}, {len(steps.flows)} flows{why}",
-        "step: explicit",
+        f"composition: {method.name}, {method.stages} stage{'s' * (method.stages > 1)}, {flows} flows{why}",
+        f"step: {step.manner}",
     ]
 
 
@@ -106,11 +100,11 @@ def _staged(flow: Flow, coefficients: Coefficients) -> list[Expression]:
     return gather(coefficients, flow.increment) if gathered < hoisted else coefficients.hoist(flow.increment)
 
 
-def _operations(flows: Sequence[Kernel], steps: Schedule) -> dict[str, int]:
+def _operations(step: Splitting) -> dict[str, int]:
     """The operations of a step, without those of compensated summation."""
-    times = Counter(part for part, _ in steps.flows)
+    times = Counter(part for part, _ in step.schedule.flows)
     counted: Counter[str] = Counter()
-    for part, kernel in enumerate(flows):
+    for part, kernel in enumerate(step.flows):
         for what, number in operation_counts(kernel.roots).items():
             counted[what] += number * times[part]
     return dict(counted)

@@ -1,19 +1,19 @@
-"""The tangent map of a step, Dx_{n+1}/Dx_n, by implicit differentiation: what the three drivers need for it.
+"""The tangent map of a step, Dx_{n+1}/Dx_n, by implicit differentiation: what the kinds of steps need for it.
 
 *newton*: α(y, ∇S_h(y)) = x gives Dy = J⁻¹, and x' = x + d(y) gives DΦ = 1 + M J⁻¹ with J and M of
-`phigen.scheme.step`: nothing beyond the kernel ``linearise``. *explicit*: the Jacobian of the increment. *path*: the
+`phigen.scheme.step`: nothing beyond ``linearise``. *explicit*: the Jacobian of the increment. *path*: the
 equation p = ∇S_h(μ(x, p)) for p, with μ the mean of the path, gives (1 − Hess S_h μ_p) Dp = Hess S_h μ_x; the end m
 of the path gives DΦ = m_x + m_p Dp. Derivatives of end and mean come from the path of the tangent structure.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 from phigen.geometry.system import System, hamiltonian_vector_field
 from phigen.scheme.generating import GeneratingFunction
-from phigen.scheme.path import Path, path_of
-from phigen.scheme.program import Kernel, Output
+from phigen.scheme.kernel import Kernel, Output
+from phigen.scheme.path import Recurrences, path_of
 from phigen.scheme.staging import Coefficients
 from phigen.series.hamilton_jacobi import momentum
 from phigen.symbolic.expression import Expression, derivatives, symbol, total
@@ -51,16 +51,7 @@ def curvature(system: System, generating: GeneratingFunction, coefficients: Coef
     )
 
 
-def tangent_kernels(
-    system: System, kernels: Mapping[str, Kernel], generating: GeneratingFunction, coefficients: Coefficients
-) -> dict[str, Kernel]:
-    """What the tangent map needs beyond the kernels of the step."""
-    if "explicit" in kernels:
-        return {"explicit_tangent": explicit_jacobian(kernels["explicit"], system.coordinates, coefficients)}
-    return {"curvature": curvature(system, generating, coefficients)} if "generate" in kernels else {}
-
-
-def tangent_path(system: System, coefficients: Coefficients) -> Path:
+def tangent_path(system: System, coefficients: Coefficients) -> Recurrences:
     """The path together with its variation v under variations of its start and of p.
 
     (m, v) is the path of the tangent Poisson structure under the covector (p, w): v̇ = ∂_m(π(m)p) v + π(m) w.

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from phigen.scheme.kernel import Kernel
 from phigen.scheme.lowering import Assignment, assign, expand_powers
-from phigen.scheme.program import Kernel
 from phigen.symbolic.expression import Expression, fold, raw, symbol, topological
 
 

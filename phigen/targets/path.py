@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from phigen.scheme.lowering import expand_powers
-from phigen.scheme.path import Path, Series, Term
+from phigen.scheme.path import Recurrences, Series, Term
 from phigen.scheme.program import Program
 from phigen.scheme.tangent import variation
 from phigen.symbolic.expression import Expression, symbols_of
@@ -29,7 +29,7 @@ class Syntax:
     sums: str  # the prefix of the functions that sum over orders
 
 
-def statements(program: Program, path: Path, syntax: Syntax) -> dict[str, list[str]]:
+def statements(program: Program, path: Recurrences, syntax: Syntax) -> dict[str, list[str]]:
     """Statements by purpose: ``fixed`` values, ``first`` coefficients, ``rules`` for order k, ``slopes``.
 
     ``nodes`` set e[i], the values of the derived series at one point, and ``field`` that of ṁ; no semicolons.
@@ -56,22 +56,22 @@ def tangent_program(program: Program) -> Program:
     return replace(program, coordinates=(*program.coordinates, *map(variation, program.coordinates)))
 
 
-def reads_coefficients(path: Path) -> bool:
+def reads_coefficients(path: Recurrences) -> bool:
     """Whether some statement reads the table of coefficients."""
     roots = [*path.fixed, *(q.first for q in path.series), *(f for q in path.series for _, f in q.linear)]
     return any(s.startswith("c:") for s in symbols_of(*roots))
 
 
-def kinds(path: Path) -> list[str]:
+def kinds(path: Recurrences) -> list[str]:
     """The kinds of sums over orders that the path needs, in a fixed order."""
     return [k for k in ("product", "chain", "power") if any(t.kind == k for q in path.series for t in q.terms)]
 
 
-def _scope(program: Program, path: Path, syntax: Syntax, series: str) -> Scope:
+def _scope(program: Program, path: Recurrences, syntax: Syntax, series: str) -> Scope:
     scope = Scope(())
     for i, c in enumerate(program.coordinates):
         scope.bind(f"p:{c}", syntax.covector.format(i=i))
-    for i in range(program.coefficients):
+    for i in range(program.step.coefficients):
         scope.bind(f"c:{i}", f"coef[{i}]")
     for i in range(len(path.series)):
         scope.bind(f"s:{i}", series.format(i=i))

@@ -24,8 +24,7 @@ _CLOSED = (
 
 def used(program: Program) -> list[str]:
     """The functions of `SPECIAL` that the kernels call, in order."""
-    roots = [e for kernel in program.kernels.values() for e in kernel.roots]
-    ops = {e.op for e in topological(roots)}
+    ops = {e.op for e in topological([e for kernel in program.kernels for e in kernel.roots])}
     return [name for name in SPECIAL if name in ops]
 
 
@@ -63,7 +62,7 @@ NEEDS = {"sinroot1": ("cosroot", "sinroot"), "arcroot": ("sinroot",), "exprel1":
 
 def entire_used(program: Program) -> list[str]:
     """The functions of `ENTIRE` that the kernels call, and those that these need, in order."""
-    ops = {e.op for e in topological([e for kernel in program.kernels.values() for e in kernel.roots])}
+    ops = {e.op for e in topological([e for kernel in program.kernels for e in kernel.roots])}
     ops |= {needed for f in NEEDS if f in ops for needed in NEEDS[f]}
     return [name for name in ENTIRE if name in ops]
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from support import NAMES, RUNS, compiled, described, setting, solver, values
 
+from phigen.scheme.steps import Path
 from phigen.symbolic.expression import gradient
 
 STEPS = 100_000
@@ -64,7 +65,7 @@ def test_casimirs_are_constant_to_round_off(name, run, trajectories):
 @pytest.mark.parametrize("name", [name for name in NAMES if described(name)[1].casimirs])
 def test_casimirs_are_constant_to_round_off_in_numpy(name):
     compilation = compiled(name)
-    at, steps = setting(compilation), 20 if compilation.program.driver == "path" else 200
+    at, steps = setting(compilation), 20 if isinstance(compilation.program.step, Path) else 200
     trajectory = solver(compilation, "numpy").integrate(at.x, at.h, steps, stride=10, parameters=at.parameters)
     for casimir, found in trajectory.casimirs.items():
         scale = size_of_casimir(compilation, trajectory, casimir)

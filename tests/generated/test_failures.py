@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from support import NAMES, SPECIES, TARGETS, PreciseStep, RawC, compile_text, compiled, described, setting, solver
 
+from phigen.scheme.steps import Explicit, Path
 from phigen.errors import StepError
 
 STATUSES = {"OK": 0, "NO_CONVERGENCE": 1, "SINGULAR": 2, "NOT_FINITE": 3, "BAD_ARGUMENT": 4}
@@ -53,7 +54,7 @@ def test_a_sum_that_overflows_leaves_the_state():
     """The position could move, the momentum cannot: neither does."""
     text = PAIR.replace("order: 2", "order: 1") + "birealisation: canonical-euler\nhamiltonian: p**2/2 + exp(q)\n"
     compilation = compile_text(text)
-    assert compilation.program.driver == "explicit"
+    assert isinstance(compilation.program.step, Explicit)
     for start in ([800.0, 1.0], [1e308, 1e308]):
         raw = RawC(compilation)
         raw.init(start)
@@ -161,7 +162,7 @@ def members_of(name, count):
 @pytest.mark.parametrize("name", NAMES)
 def test_members_of_an_ensemble_are_trajectories(name):
     start, at = members_of(name, 5)
-    compilation, steps = compiled(name), 5 if compiled(name).program.driver == "path" else 20
+    compilation, steps = compiled(name), 5 if isinstance(compiled(name).program.step, Path) else 20
     for target in TARGETS:
         solve = solver(compilation, target)
         together = solve.ensemble(start, at.h, steps, parameters=at.parameters)

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from phigen.scheme.steps import Explicit, Newton
 from support import BODY, SPECIES, compile_text, solver
 
 #: Below this the error is that of the reference and of rounding.
@@ -59,7 +60,7 @@ def test_symmetric_methods_have_even_orders(text, x0, time, order):
 @pytest.mark.parametrize("text", [ROD, BEAD], ids=["separable", "not separable"])
 def test_one_sided_methods_have_every_order(text, side, order):
     compilation = compile_text(f"{text}birealisation: {{kind: canonical-euler, side: {side}}}\norder: {order}\n")
-    assert compilation.program.driver == ("explicit" if text == ROD and order == 1 else "newton")
+    assert isinstance(compilation.program.step, Explicit if text == ROD and order == 1 else Newton)
     assert order_of(compilation, [0.5, 0.8], 1.0) == pytest.approx(order, abs=0.25)
 
 

@@ -8,6 +8,7 @@ import pytest
 from support import COMMAND, SPECIES, TARGETS, compile_text, compiled, run, setting, solver, tool, write
 
 from phigen.compiler import emit
+from phigen.scheme.steps import Explicit, Splitting
 from phigen.errors import StepError
 
 EXERCISE = Path(__file__).with_name("packs.c")
@@ -63,7 +64,7 @@ def test_vectorised_packs_equal_single_trajectories(name, tmp_path):
 def test_members_of_explicit_steps_equal_single_trajectories(kind, tmp_path):
     text, ulps = EXPLICIT[kind]
     compilation = compile_text(text + RUN)
-    assert compilation.program.driver == "explicit"
+    assert isinstance(compilation.program.step, Explicit)
     exercise(compilation, tmp_path, "-O1", ulps, 1)
 
 
@@ -158,7 +159,7 @@ def test_what_lanes_cannot_compute_is_not_taken_for_infinite(scheme):
     """exp(-800) is 0, but out of reach in a lane: taken for infinite, the force would be 0, and the step no failure."""
     text = "coordinates: [q, p, c]\npoisson: {brackets: {q: {p: 1}}}\nhamiltonian: p**2/2 + q/(1 + exp(c))\norder: 2\n"
     compilation = compile_text(text, scheme=scheme)
-    assert compilation.program.driver in ("explicit", "splitting")
+    assert isinstance(compilation.program.step, Explicit | Splitting)
     ends = solver(compilation, "c").ensemble([[0.0, 0.0, -800.0], [0.0, 0.0, 0.0]], 0.125, 64)
     np.testing.assert_allclose(ends, [[-32, -8, -800], [-16, -4, 0]], rtol=1e-14)
 

@@ -14,6 +14,7 @@ from support import BODY, NAMES, TARGETS, PreciseStep, RawC, compile_text, compi
 from phigen import StepError, compile, resources, spec
 from phigen.analysis.arrays import evaluate
 from phigen.compiler import compile_spec
+from phigen.scheme.steps import Explicit, Path
 from phigen.spec.model import Extras
 
 TANGENT = Extras(tangent=True)
@@ -68,13 +69,13 @@ def test_step_is_a_poisson_map(name, target):
 
 
 @pytest.mark.parametrize("target", TARGETS)
-@pytest.mark.parametrize("name", [n for n in KINDS if compiled(n).program.driver != "explicit"])
+@pytest.mark.parametrize("name", [n for n in KINDS if not isinstance(compiled(n).program.step, Explicit)])
 def test_tangent_agrees_with_many_digits(name, target):
     compilation = with_tangent(name)
     at = setting(compilation)
     image, tangent = solver(compilation, target).step_tangent(at.x, at.h, parameters=at.parameters)
     x = [mpmath.mpf(v) for v in at.x]
-    if compilation.program.path:
+    if isinstance(compilation.program.step, Path):
         expected_image, expected = PrecisePathStep(compilation, at.parameters, at.h).solve(x)
     else:
         expected_image, expected = PreciseStep(compilation, at.parameters, at.h).tangent(x)
@@ -189,7 +190,7 @@ def test_code_without_extras_is_the_same_whatever_was_compiled_before():
     with_tangent("rigid_body")
     again = compile_text(f"{BODY}order: 4\n")
     asked = text_with_tangent(f"{BODY}order: 4\n")
-    assert asked.program.kernels["linearise"] == again.program.kernels["linearise"]
+    assert asked.program.step.linearise == again.program.step.linearise
 
 
 @pytest.mark.parametrize("compiler", ["gcc", "clang"])

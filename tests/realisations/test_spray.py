@@ -412,11 +412,11 @@ def test_an_exact_spray_has_no_defect():
         f"coordinates: [x, y, z]\npoisson: {LOG3}\nhamiltonian: x + y + z\nbirealisation: spray\norder: 4\n"
     )
     assert PreciseStep(compilation, {}, 1 / 16).defect(START) < 1e-40
-    assert not any("approximate" in fact for fact in compilation.program.facts)
+    assert not any("approximate" in fact for fact in compilation.program.about.facts)
 
 
 def test_the_program_says_that_it_is_approximate():
-    facts = " ".join(compile_text(f"{BODY}birealisation: spray\norder: 4\n").program.facts)
+    facts = " ".join(compile_text(f"{BODY}birealisation: spray\norder: 4\n").program.about.facts)
     assert "approximate: alpha and beta are cut off at degree 5 in p" in facts
 
 

@@ -85,7 +85,7 @@ def evaluated(assignments, roots, at):
 def state_and_coefficients(compilation):
     """Numbers for everything that the kernels of a program read."""
     at = {}
-    for kernel in compilation.program.kernels.values():
+    for kernel in compilation.program.kernels:
         for names in kernel.inputs.values():
             at |= {name: mpmath.mpf(11 + 3 * k + 7 * k * k % 13) / 29 for k, name in enumerate(names)}
     return at
@@ -96,7 +96,7 @@ def test_assignments_compute_the_roots(name):
     compilation = compiled(name)
     with mpmath.workdps(40):
         at = state_and_coefficients(compilation)
-        for kernel in compilation.program.kernels.values():
+        for kernel in compilation.program.kernels:
             expanded = expand_powers(kernel.roots)
             assignments, trees = assign(expanded)
             found, expected = evaluated(assignments, trees, at), values(kernel.roots, at)
@@ -111,10 +111,9 @@ def test_the_step_reads_neither_parameters_nor_step_size(name):
     """Everything that does not depend on the state is a coefficient, computed by prepare."""
     program = compiled(name).program
     static = {p.name for p in program.parameters} | {"h:"}
-    for key in ("linearise", "explicit"):
-        if key in program.kernels:
-            assert not static & set(symbols_of(*program.kernels[key].roots))
-    assert not set(program.coordinates) & set(symbols_of(*program.kernels["prepare"].roots))
+    for kernel in program.step.kernels:
+        assert kernel is program.step.prepare or not static & set(symbols_of(*kernel.roots))
+    assert not set(program.coordinates) & set(symbols_of(*program.step.prepare.roots))
 
 
 def test_hoisting_keeps_values_and_takes_the_largest_static_parts():

@@ -281,4 +281,4 @@ def test_nested_definitions_are_left_unexpanded():
     lines = [f"  a{k}: a{k - 1} + sin(a{k - 1})" if k else "  a0: q + sin(p)" for k in range(13)]
     canonical = "coordinates: [q, p]\npoisson: {canonical: {q: [q], p: [p]}}\n"
     text = canonical + "definitions:\n" + "\n".join(lines) + "\nhamiltonian: p**2/2 + a12\norder: 4\n"
-    assert compile_text(text).program.operations["functions"] < 100
+    assert compile_text(text).program.about.operations["functions"] < 100

@@ -63,8 +63,8 @@ def test_a_changed_coefficient_breaks_the_conditions():
 
 def composition_of(text, order, name="auto"):
     """The name of the composition, and whether kicks are modified."""
-    program = compile_text(text + f"composition: {name}\n", order, "splitting").program
-    return program.composition, bool(program.schedule.multiples)
+    step = compile_text(text + f"composition: {name}\n", order, "splitting").program.step
+    return step.composition, bool(step.schedule.multiples)
 
 
 @pytest.mark.parametrize("order", [4, 6, 8])
@@ -73,12 +73,13 @@ def composition_of(text, order, name="auto"):
 )
 def test_mechanical_systems_get_fewer_flows_than_alternations_need(name, order):
     program = compiled(name, order, "splitting").program
-    assert program.composition in nystrom.NAMES
+    step = program.step
+    assert step.composition in nystrom.NAMES
     others = alternation.schedule(alternation.find("auto", order), 2)
-    least = min(len(m.times) for m in nystrom.METHODS if m.order == order and m.name == program.composition)
-    assert least <= len(program.schedule.flows)
-    assert any("= 0" in fact for fact in program.facts)
-    assert order < 8 or len(program.schedule.flows) < len(others.flows)
+    least = min(len(m.times) for m in nystrom.METHODS if m.order == order and m.name == step.composition)
+    assert least <= len(step.schedule.flows)
+    assert any("= 0" in fact for fact in program.about.facts)
+    assert order < 8 or len(step.schedule.flows) < len(others.flows)
 
 
 def test_the_price_of_kicks_decides_whether_they_are_modified():
@@ -90,7 +91,7 @@ def test_the_price_of_kicks_decides_whether_they_are_modified():
 
 def test_either_part_may_be_the_one_that_kicks():
     found = compile_text(PLANE + "hamiltonian: p**2/2 + p*q**2\n", 4, "splitting")
-    assert found.program.composition in nystrom.NAMES
+    assert found.program.step.composition in nystrom.NAMES
     v = found.splitting.flows[found.splitting.kick].hamiltonian
     assert derivatives([v], "p")[0] != 0
 

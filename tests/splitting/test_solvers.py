@@ -97,7 +97,7 @@ def test_a_step_that_leaves_the_numbers_fails_and_the_state_before_it_stands(tar
 def test_exact_flow_is_followed_in_one_piece():
     text = "coordinates: [x, y, z]\npoisson: {brackets: {x: {y: -z, z: y}, y: {z: -x}}}\nhamiltonian: x**2\n"
     found = compile_text(text, 2, "splitting")
-    assert [len(found.splitting.flows), len(found.program.schedule.flows)] == [1, 1]
+    assert [len(found.splitting.flows), len(found.program.step.schedule.flows)] == [1, 1]
     x = solver(found, "c").step([0.3, 0.4, 1.2], 7.0)
     turned = 0.4 * np.cos(4.2) + 1.2 * np.sin(4.2)
     assert x[:2] == pytest.approx([0.3, turned], abs=1e-15)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from support import TARGETS, compile_text, solver, values
 
-from phigen.scheme.program import Kernel, Output
+from phigen.scheme.kernel import Kernel, Output
 from phigen.symbolic.entire import ENTIRE
 from phigen.symbolic.expression import EULER, FUNCTIONS, ONE, PI, call, number, power, raw, symbol
 from phigen.symbolic.special import SPECIAL
@@ -125,11 +125,11 @@ def everything():
         "coordinates: [x, y, z]\npoisson: {matrix: [[0, 1, 0], [-1, 0, 0], [0, 0, 0]]}\nhamiltonian: x\n"
     )
     named = list(cases())
-    kernel = replace(base.program.kernels["casimirs"], outputs=(Output("out", tuple(e for _, e in named)),))
+    kernel = replace(base.program.observables.casimirs, outputs=(Output("out", tuple(e for _, e in named)),))
     program = replace(
         base.program,
         casimirs=tuple(f"C{k}" for k in range(len(named))),
-        kernels={**base.program.kernels, "casimirs": kernel},
+        observables=replace(base.program.observables, casimirs=kernel),
     )
     return replace(base, program=program), named
 
@@ -159,6 +159,6 @@ def test_everything_that_can_be_written_is_computed_right(everything, target):
 
 def test_kernels_of_that_program_are_not_constant(everything):
     compilation, _ = everything
-    kernel = compilation.program.kernels["casimirs"]
+    kernel = compilation.program.observables.casimirs
     assert isinstance(kernel, Kernel)
     assert len(set(kernel.roots)) > 150

@@ -11,6 +11,7 @@ import pytest
 from support import COMMAND, TARGETS, compile_text, files, solver
 
 from phigen.compiler import emit
+from phigen.scheme.steps import Explicit
 from phigen.spec.names import ARGUMENTS, SPEC_FUNCTIONS
 from phigen.targets.header import is_edited, plain
 from phigen.targets.names import C_RESERVED, PYTHON_RESERVED, Scope
@@ -77,7 +78,7 @@ def test_awkward_names_can_be_coordinates_of_an_explicit_system(start, tmp_path)
     energy = " + ".join(f"part{i}" for i in range(len(chunks(energy))))
     text += f"{definitions}hamiltonian: {energy}\nbirealisation: canonical-euler\norder: 1\n"
     compilation = compile_text(text)
-    assert compilation.program.driver == "explicit"
+    assert isinstance(compilation.program.step, Explicit)
     check_c(compilation, tmp_path)
     agree(compilation, np.linspace(0.5, 1.5, len(names)))
 

@@ -24,6 +24,7 @@ from phigen.geometry.system import System
 from phigen.runtime import cache
 from phigen.runtime.backend import Backend
 from phigen.runtime.interface import Interface
+from phigen.scheme.steps import Splitting
 from phigen.spec.model import Spec
 from phigen.targets.header import split
 
@@ -88,10 +89,12 @@ def built(compilation: Compilation, setting: Setting, start: float) -> Built:
     files = emit(program, target, f"phigen build {program.name}.yaml")
     if target == "c":
         cache.build(files)
-    stages = program.schedule.stages if program.schedule else len(program.fractions)
+    step = program.step
+    stages = step.schedule.stages if isinstance(step, Splitting) else len(program.fractions)
+    composition = step.composition if isinstance(step, Splitting) else ""
     return Built(
         setting, files, interface_of(program), compilation.label, program.order, compilation.exact,
-        compilation.symmetric, bool(program.gauge), stages, program.composition,
+        compilation.symmetric, bool(program.gauge), stages, composition,
         time.perf_counter() - start,
     )  # fmt: skip
 

@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from phigen.scheme.program import PLAUSIBLE, Program
+from phigen.scheme.kernel import Kernel
+from phigen.scheme.program import Program
+from phigen.scheme.steps import PLAUSIBLE, Explicit, Implicit, InnerSolve, Newton, Path, Splitting
 from phigen.targets import special
 from phigen.targets.c import extras, lanes, packs, small, splitting
 from phigen.targets.c.kernels import LANES, apart, function, members, printer, wrapped_arguments
@@ -70,7 +72,8 @@ def _render(template: str, values: Mapping[str, object]) -> str:
 
 
 def _values(program: Program) -> dict[str, object]:
-    parameters, member = program.parameters, members(program)
+    parameters, member, step = program.parameters, members(program), program.step
+    inner = step.inner if isinstance(step, Implicit) else InnerSolve()
     return {
         "NAME": program.name,
         "n": program.dimension,
@@ -79,14 +82,14 @@ def _values(program: Program) -> dict[str, object]:
         "casimir_count": len(program.casimirs),
         "casimir_size": max(1, len(program.casimirs)),
         "version": program.version,
-        "sha256": program.spec_sha256,
+        "sha256": program.about.spec_sha256,
         **_gauge_values(program),
         "extra_declarations": extras.declarations(program),
         "stages": len(program.fractions),
         "fractions": ", ".join(repr(f) for f in program.fractions),
         "terms": TERMS,
-        "series": len(program.path.series) if program.path else 0,
-        "coefficients": max(1, program.coefficients),
+        "series": len(step.recurrences.series) if isinstance(step, Path) else 0,
+        "coefficients": max(1, step.coefficients),
         "history": HISTORY,
         **_memory_values(program),
         **_memory_lines(program),
@@ -97,13 +100,13 @@ def _values(program: Program) -> dict[str, object]:
         ]
         or [("char unused;", "this system has no parameters")],
         "defaults": ", ".join(repr(float(p.value)) for p in parameters) or "0",
-        "max_iterations": program.max_iterations,
-        "tolerance": repr(program.tolerance),
+        "max_iterations": inner.max_iterations,
+        "tolerance": repr(inner.tolerance),
         **{f"{key}_signature": "\n".join(lines) for key, lines in _signatures(program).items()},
         "apart": apart(program),
         **lanes.values(program, _memory_values(program)),
         **packs.values(program),
-        "pivoting": f"{program.name}_solve" + ("_pivoting" if "eliminate" in program.kernels else ""),
+        "pivoting": f"{program.name}_solve" + ("_pivoting" if isinstance(step, Implicit) and step.eliminate else ""),
     }
 
 
@@ -136,7 +139,7 @@ def _memory_values(program: Program) -> dict[str, Any]:
 def _memory_lines(program: Program) -> dict[str, object]:
     """The memory of the inner solve, where there is one."""
     name, stages = program.name, len(program.fractions)
-    if program.driver in ("explicit", "splitting"):
+    if not isinstance(program.step, Implicit):
         nothing: dict[str, object] = dict.fromkeys(("memory_type", "memory_members", "memory_reset", "retry"), ())
         return nothing | {"remembered_value": "at.x"}
     head = {"NAME": name, **_memory_values(program)}
@@ -159,31 +162,30 @@ def _memory_lines(program: Program) -> dict[str, object]:
 
 
 def _gauge_values(program: Program) -> dict[str, object]:
-    name, count = program.name, len(program.gauge)
-    if not count:
+    name, gauge = program.name, program.gauge
+    if not gauge:
         nothing: dict[str, object] = dict.fromkeys(("gauge_members", "gauge_declarations", "gauge_init"), ())
         return nothing | {"gauges": 0, "products": 0, "prepare_arguments": "&s->params"}
+    count = len(gauge.casimirs)
     said = "Start at x0 with a gauge of one's own: the step is an exact Poisson map for each fixed gauge"
     return {
         "gauges": count,
         "products": 1 + 2 * count,
         "prepare_arguments": "&s->params, s->gauge",
-        "gauge_members": [f"double gauge[{count}]; /* multiples of {', '.join(program.gauge)} taken from H */"],
+        "gauge_members": [f"double gauge[{count}]; /* multiples of {', '.join(gauge.casimirs)} taken from H */"],
         "gauge_declarations": [
             f"/* {said}. */",
-            *_init_gauge(program)[:-1],
-            _init_gauge(program)[-1] + ";\n",
+            *_init_gauge(program, count)[:-1],
+            _init_gauge(program, count)[-1] + ";\n",
         ],
         "gauge_init": [f"{name}_choose_gauge(&s->params, s->x, s->gauge);"],
     }
 
 
-def _init_gauge(program: Program) -> list[str]:
+def _init_gauge(program: Program, count: int) -> list[str]:
     name, n = program.name, program.dimension
     arguments = [f"{name}_solver *s", f"const {name}_params *params", f"const double x0[{n}]"]
-    return wrapped_arguments(
-        f"{name}_status {name}_init_gauge(", [*arguments, f"const double gauge[{len(program.gauge)}]"]
-    )
+    return wrapped_arguments(f"{name}_status {name}_init_gauge(", [*arguments, f"const double gauge[{count}]"])
 
 
 def _signatures(program: Program) -> dict[str, list[str]]:
@@ -192,7 +194,7 @@ def _signatures(program: Program) -> dict[str, list[str]]:
     solver, params, status = f"{name}_solver *s", f"const {name}_params *params", f"{name}_status "
     many = ["double *x", "size_t members", "double h", "size_t steps", "unsigned char *status"]
     return {
-        "init_gauge": _init_gauge(program),
+        "init_gauge": _init_gauge(program, len(program.gauge.casimirs) if program.gauge else 0),
         "init": wrapped_arguments(f"{status}{name}_init(", [solver, params, f"const double x0[{n}]"]),
         "ensemble": wrapped_arguments(f"{status}{name}_ensemble(", [params, *many]),
         "hamiltonian": wrapped_arguments(f"double {name}_hamiltonian(", [params, f"const double x[{n}]"]),
@@ -212,52 +214,59 @@ def _path_syntax(program: Program) -> Syntax:
 
 
 def _body(program: Program) -> str:
-    values = _values(program)
-    kernels = program.kernels
+    values, step = _values(program), program.step
 
-    def static(name: str) -> str:
-        return function(program, kernels[name]) + "\n"
+    def static(kernel: Kernel) -> str:
+        return function(program, kernel) + "\n"
 
-    def exported(name: str) -> str:
-        return function(program, kernels[name], exported=True) + "\n"
+    def exported(kernel: Kernel) -> str:
+        return function(program, kernel, exported=True) + "\n"
 
     pieces = [_render("preamble.c", values)]
     pieces += [_render("phi.c", special.values(f, f"{program.name}_{f}")) for f in special.used(program)]
     pieces += small.pieces(program)
-    if program.driver != "splitting":
-        pieces.append(static("prepare"))
-    if program.driver not in ("explicit", "splitting"):
-        pieces += [static("generate" if program.path else "linearise"), _render("pivoting.c", values)]
-        if "eliminate" in kernels:
-            pieces += [static("eliminate"), _render("unrolled.c", values)]
+    if not isinstance(step, Splitting):
+        pieces.append(static(step.prepare))
+    if isinstance(step, Implicit):
+        pieces += [static(step.main), _render("pivoting.c", values)]
+        if step.eliminate:
+            pieces += [static(step.eliminate), _render("unrolled.c", values)]
         pieces += [_render(f"{template}.c", values) for template in ("remember", "project", "train", "learn")]
         pieces.append(_render("plausible.c", values))
-    if program.driver != "splitting" or program.extras.tangent:
+    if not isinstance(step, Splitting) or program.extras.tangent:
         pieces.append(_render("advance.c", values))
-    if program.path:
-        unused = [] if reads_coefficients(program.path) else ["(void)coef;"]
-        piece = values | statements(program, program.path, _path_syntax(program)) | {"unused": unused}
-        pieces += [_render(f"taylor_{kind}.c", values) for kind in kinds(program.path)]
-        pieces += [_render("holds.c", piece), _render("piece.c", piece)]
-        pieces += [_render("path.c", values), _render("path_step.c", values)]
-    elif program.driver == "newton":
-        pieces += [_render("size_relative.c" if program.relative else "size.c", values), _render("newton.c", values)]
-    elif program.driver == "splitting":
-        pieces += splitting.pieces(program, values)
-    else:
-        pieces += [static("explicit"), _render("explicit.c", values)]
-    if program.driver != "splitting":
+    match step:
+        case Path():
+            pieces += _path(program, step, values)
+        case Newton():
+            size = "size_relative.c" if step.inner.relative else "size.c"
+            pieces += [_render(size, values), _render("newton.c", values)]
+        case Splitting():
+            pieces += splitting.pieces(program, step, values)
+        case Explicit():
+            pieces += [static(step.increment), _render("explicit.c", values)]
+    if not isinstance(step, Splitting):
         pieces.append(_render("compose.c", values))
     if program.gauge:
-        pieces += [static("guide"), static("products"), _render("gauge.c", values)]
-        pieces += [_render("gauge_line.c", values), _render("choose_gauge.c", values)]
+        pieces += [static(program.gauge.guide), static(program.gauge.products)]
+        pieces += [_render(f"{template}.c", values) for template in ("gauge", "gauge_line", "choose_gauge")]
     if program.extras.tangent:
         pieces += extras.tangent(program, values, _path_syntax(program))
-    if "modified" in kernels:
-        pieces += extras.modified(program, values)
+    if program.modified:
+        pieces += extras.modified(program, program.modified.kernel, values)
     pieces += [_render("api.c", values)]
     pieces += packs.pieces(program, values) if packs.packed(program) else lanes.pieces(program, values)
-    pieces += [static("energy"), exported("casimirs"), exported("vector_field")]
+    seen = program.observables
+    pieces += [static(seen.energy), exported(seen.casimirs), exported(seen.vector_field)]
     if any(apart(program) in piece for piece in pieces):
         pieces.insert(1, _render("apart.c", values))
     return "\n".join([*pieces, _render("observables.c", values)])
+
+
+def _path(program: Program, step: Path, values: Mapping[str, object]) -> list[str]:
+    path = step.recurrences
+    unused = [] if reads_coefficients(path) else ["(void)coef;"]
+    piece = {**values, **statements(program, path, _path_syntax(program)), "unused": unused}
+    pieces = [_render(f"taylor_{kind}.c", values) for kind in kinds(path)]
+    pieces += [_render("holds.c", piece), _render("piece.c", piece)]
+    return [*pieces, _render("path.c", values), _render("path_step.c", values)]

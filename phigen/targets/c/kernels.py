@@ -6,7 +6,8 @@ import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-from phigen.scheme.program import Kernel, Program
+from phigen.scheme.kernel import Kernel
+from phigen.scheme.program import Program
 from phigen.symbolic.entire import ENTIRE
 from phigen.symbolic.special import SPECIAL
 from phigen.targets.code import Code, lower, parts

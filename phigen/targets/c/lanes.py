@@ -7,7 +7,9 @@ from collections.abc import Mapping, Sequence, Set
 from dataclasses import replace
 from typing import Any
 
-from phigen.scheme.program import Kernel, Program
+from phigen.scheme.kernel import Kernel
+from phigen.scheme.program import Program
+from phigen.scheme.steps import Factorisation, Implicit, Newton, Path, PathLanes
 from phigen.symbolic.expression import topological
 from phigen.symbolic.special import LANE_REACH, SPECIAL, lane_coefficients, order_of
 from phigen.targets.c import paths
@@ -70,14 +72,15 @@ _PI = 3.141592651605606, 1.9841871479187034e-09, 1.1442377452219664e-17
 def blocks(program: Program) -> bool:
     """Whether `integrate` takes blocks of steps: not for explicit steps, long paths (`paths.applies`), what would need
     too much stack, or where the spec says no."""
-    able = program.driver == "newton" or (program.driver == "path" and program.path_slopes is not None)
+    step = program.step
+    able = isinstance(step, Newton) or (isinstance(step, Path) and step.lanes is not None)
     return program.lanes and able and _block_size(program, paths.SLOPE_TERMS[-1]) <= MOST_STACK
 
 
 def _block_size(program: Program, slope_terms: int) -> int:
     n = program.dimension
     more, once = paths.stack(program, slope_terms)
-    return 8 * LANES * (len(program.fractions) * (program.coefficients + 4 * n + 3 * n * n + more) + once)
+    return 8 * LANES * (len(program.fractions) * (program.step.coefficients + 4 * n + 3 * n * n + more) + once)
 
 
 def _slope_terms(program: Program) -> int:
@@ -94,7 +97,13 @@ def vectorised(program: Program) -> bool:
 
 def _operations(program: Program) -> set[str]:
     """What the kernels that are evaluated in lanes call."""
-    kernels = paths.kernels(program) if program.path else [program.kernels["linearise"]]
+    match program.step:
+        case Newton(linearise=linearise):
+            kernels = [linearise]
+        case Path() as step if step.lanes:
+            kernels = paths.kernels(program, step, step.lanes)
+        case _:
+            kernels = []
     return {e.op for e in topological([e for kernel in kernels for e in kernel.roots])}
 
 
@@ -104,7 +113,7 @@ def groups(program: Program, rows: int) -> bool:
     if not blocks(program):
         return False
     values = (
-        len(program.fractions) * (program.coefficients + rows * n)
+        len(program.fractions) * (program.step.coefficients + rows * n)
         + 7 * n
         + 3 * n * n
         + sum(paths.stack(program, _slope_terms(program)))
@@ -114,13 +123,14 @@ def groups(program: Program, rows: int) -> bool:
 
 def values(program: Program, memory: Mapping[str, int]) -> Mapping[str, object]:
     """What the templates of this room read; ``memory`` says how many values are remembered."""
+    step = program.step
     grouped = groups(program, memory["fitted"] + memory["window"])
     return {
         "lanes": LANES,
         "each_lane": each_lane(program),
-        "floor": "0.0" if program.relative else "1e-6",
+        "floor": "0.0" if isinstance(step, Implicit) and step.inner.relative else "1e-6",
         "frozen": repr(FROZEN),
-        "passes": PASSES if vectorised(program) and not program.path else PASSES_OF_CALLS,
+        "passes": PASSES if vectorised(program) and not isinstance(step, Path) else PASSES_OF_CALLS,
         "model_members": _matrices(program) + paths.model_members(program) if blocks(program) else [],
         "ensemble_how": f"{LANES} are integrated\n   side by side, and with OpenMP such groups in parallel."
         if grouped
@@ -134,29 +144,28 @@ def values(program: Program, memory: Mapping[str, int]) -> Mapping[str, object]:
     }
 
 
-def sparse(program: Program) -> bool:
-    """Whether the Newton matrix has so many zeros that its factors are kept, not its inverse."""
-    return "factorise" in program.kernels
+def factors_of(program: Program) -> Factorisation | None:
+    """The factors of the Newton matrix, if it has so many zeros that they are kept, not its inverse."""
+    return program.step.factors if isinstance(program.step, Newton) else None
 
 
 def _matrices(program: Program) -> list[str]:
     """The matrices of a model."""
-    lanes, n = f"{program.name}_lanes", program.dimension
-    if not sparse(program):
+    lanes, n, factors = f"{program.name}_lanes", program.dimension, factors_of(program)
+    if factors is None:
         said = "a residual r of alpha(y) = x takes inverse r from y, and gain r from the increment"
         return [f"/* {said} */", f"{lanes} inverse[{n * n}], slope[{n * n}], gain[{n * n}];"]
-    factors = len(program.kernels["factorise"].outputs[0].values)
     said = "of the Jacobian of alpha(y); that of the increment; what corrections take from the increment"
-    return [f"/* {said} */", f"{lanes} factor[{factors}], slope[{n * n}], gained[{n}];"]
+    return [f"/* {said} */", f"{lanes} factor[{len(factors.factorise.roots)}], slope[{n * n}], gained[{n}];"]
 
 
 def _templates(program: Program, names: Sequence[str]) -> list[str]:
-    return [f"{name}_sparse" if sparse(program) and name in _DENSE else name for name in names]
+    return [f"{name}_sparse" if factors_of(program) and name in _DENSE else name for name in names]
 
 
 def _group_values(program: Program) -> Mapping[str, object]:
     """What is particular to each member of an ensemble: the gauge, where it is chosen at the start."""
-    gauges = len(program.gauge)
+    gauges = len(program.gauge.casimirs) if program.gauge else 0
     if not gauges:
         return {"group_gauge": (), "group_join": (), "init_member": "init(&s, params, x)"}
     return {
@@ -173,35 +182,39 @@ def pieces(program: Program, values: Mapping[str, Any]) -> list[str]:
         return [render("c", f"{template}.c", values) for template in ("integrate", *ensemble)]
     found = [render("c", f"{template}.c", values) for template in ("lanes", "table")]
     found += lane_functions(program, _operations(program))
-    found += _paths(program, values) if program.path else _stages(program, values)
+    match program.step:
+        case Newton() as step:
+            found += _stages(program, step, values)
+        case Path() as step if step.lanes:
+            found += _paths(program, step, step.lanes, values)
     names = _templates(program, (*_BLOCKS, *ensemble, "lanes_end"))
     return found + [render("c", f"{template}.c", values) for template in names]
 
 
-def _stages(program: Program, values: Mapping[str, Any]) -> list[str]:
+def _stages(program: Program, step: Newton, values: Mapping[str, Any]) -> list[str]:
     """A stage in all lanes, for alpha and beta that are formulas."""
-    kernel = program.kernels["linearise"]
-    found = [function(program, kernel, lanes=True, sparse=sparse(program)) + "\n"]
-    found.append(function(program, _without_matrices(kernel), lanes=True) + "\n")
-    if sparse(program):
-        substitute = program.kernels["substitute"]
-        found.append(function(program, program.kernels["factorise"], lanes=True) + "\n")
-        found.append(function(program, substitute, lanes=True) + "\n")
-        found.append(function(program, substitute, lanes=True, single=True, shared=["side"]) + "\n")
+    factors = step.factors
+    found = [function(program, step.linearise, lanes=True, sparse=factors is not None) + "\n"]
+    found.append(function(program, _without_matrices(step.linearise), lanes=True) + "\n")
+    if factors:
+        found.append(function(program, factors.factorise, lanes=True) + "\n")
+        found.append(function(program, factors.substitute, lanes=True) + "\n")
+        found.append(function(program, factors.substitute, lanes=True, single=True, shared=["side"]) + "\n")
         found.append(render("c", "tabulate_sparse.c", values))
-    elif "invert" in program.kernels:
-        found.append(function(program, program.kernels["invert"], lanes=True) + "\n")
+    elif step.invert:
+        found.append(function(program, step.invert, lanes=True) + "\n")
         found.append(render("c", "tabulate_unrolled.c", values))
     else:
         found.append(render("c", "tabulate.c", values))
     return found + [render("c", f"{template}.c", values) for template in _templates(program, (*_MODELS, "update"))]
 
 
-def _paths(program: Program, values: Mapping[str, Any]) -> list[str]:
+def _paths(program: Program, step: Path, several: PathLanes, values: Mapping[str, Any]) -> list[str]:
     """A stage in all lanes, for alpha and beta that are the ends of a path."""
-    found = [function(program, kernel, lanes=True) + "\n" for kernel in paths.kernels(program)]
+    kernels = paths.kernels(program, step, several)
+    found = [function(program, kernel, lanes=True) + "\n" for kernel in kernels]
     found += [render("c", f"{template}.c", values) for template in _MODELS]
-    return found + paths.pieces(program, values, _slope_terms(program))
+    return found + paths.pieces(program, step, several, values, _slope_terms(program))
 
 
 def lane_functions(program: Program, ops: Set[str]) -> list[str]:

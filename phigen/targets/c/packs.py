@@ -7,6 +7,7 @@ from fractions import Fraction
 
 from phigen.scheme.lowering import expand_powers
 from phigen.scheme.program import Program
+from phigen.scheme.steps import Explicit, Implicit, Splitting
 from phigen.symbolic.expression import Expression, topological
 from phigen.targets.c import splitting
 from phigen.targets.c.kernels import FUNCTIONS, LANE_FORMULAS, LANE_FUNCTIONS, LANES, function, lane_calls
@@ -27,7 +28,7 @@ _ARITHMETIC = (Fraction(2), Fraction(-1), Fraction(1, 2))
 def packed(program: Program) -> bool:
     """Whether the members of an ensemble are put into packs: where steps are explicit, all members have the same
     coefficients, every function has a version for lanes, and the spec does not say no."""
-    explicit = program.driver in ("explicit", "splitting") and not program.gauge
+    explicit = not isinstance(program.step, Implicit) and not program.gauge
     states = 2 * PACKS * LANES * 3 * program.dimension
     return explicit and program.lanes and not _calls(program) and 8 * states <= MOST_STACK
 
@@ -41,8 +42,12 @@ def _calls(program: Program) -> set[str]:
 
 
 def _values_of_steps(program: Program) -> list[Expression]:
-    kernels = program.kernels
-    return [e for name in kernels if name == "explicit" or name.startswith("flow") for e in kernels[name].roots]
+    match program.step:
+        case Explicit(increment=kernel):
+            return kernel.roots
+        case Splitting(flows=flows):
+            return [e for flow in flows for e in flow.roots]
+    return []
 
 
 def _operations(program: Program) -> set[str]:
@@ -51,7 +56,7 @@ def _operations(program: Program) -> set[str]:
 
 def _two_ways(program: Program) -> bool:
     """Whether flows call functions that are polynomials near 0: where these do not reach, there is a longer way."""
-    return program.driver == "splitting" and bool(_operations(program) & set(NEAR_FUNCTIONS))
+    return isinstance(program.step, Splitting) and bool(_operations(program) & set(NEAR_FUNCTIONS))
 
 
 def values(program: Program) -> Mapping[str, object]:
@@ -71,7 +76,7 @@ def values(program: Program) -> Mapping[str, object]:
     far = _two_ways(program)
     start = f"{name}_lanes start[{program.dimension}]; /* x where a step began; in it, carry is moved */"
     return {
-        "pack_members": [start] if program.driver == "splitting" else [],
+        "pack_members": [start] if isinstance(program.step, Splitting) else [],
         "packs": PACKS,
         "stretch": STRETCH,
         "group_size": "GROUP",
@@ -88,14 +93,15 @@ def pieces(program: Program, values: Mapping[str, object]) -> list[str]:
     found = [render("c", f"{template}.c", values) for template in ("integrate", "lanes")]
     found += lane_functions(program, _operations(program))
     found.append(render("c", "pack.c", values))
-    if program.driver == "explicit":
-        found.append(function(program, program.kernels["explicit"], lanes=True, shared=["coef"]) + "\n")
-        found.append(render("c", "explicit_lanes.c", values))
-    else:
-        short = {f: f"{program.name}_{f}_near" for f in NEAR_FUNCTIONS}
-        found += [*near(program, _operations(program)), render("c", "add_lanes.c", values)]
-        found += splitting.in_lanes(program, values, "", {**lane_calls(program), **short})
-        if _two_ways(program):
-            found += splitting.in_lanes(program, values, "_far", lane_calls(program))
+    match program.step:
+        case Explicit(increment=kernel):
+            found.append(function(program, kernel, lanes=True, shared=["coef"]) + "\n")
+            found.append(render("c", "explicit_lanes.c", values))
+        case Splitting() as step:
+            short = {f: f"{program.name}_{f}_near" for f in NEAR_FUNCTIONS}
+            found += [*near(program, _operations(program)), render("c", "add_lanes.c", values)]
+            found += splitting.in_lanes(program, step, values, "", {**lane_calls(program), **short})
+            if _two_ways(program):
+                found += splitting.in_lanes(program, step, values, "_far", lane_calls(program))
     templates = ("pack_group", "pack_run", "ensemble", "lanes_end")
     return found + [render("c", f"{template}.c", values) for template in templates]

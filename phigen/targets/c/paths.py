@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from phigen.scheme.kernel import Kernel, Output
 from phigen.scheme.lowering import expand_powers
-from phigen.scheme.path import Entry, PathSlopes, Series, Term
-from phigen.scheme.program import Kernel, Output, Program
+from phigen.scheme.path import Entry, PathSlopes, Recurrences, Series, Term
+from phigen.scheme.program import Program
+from phigen.scheme.steps import Path, PathLanes
 from phigen.series.hamilton_jacobi import momentum
 from phigen.symbolic.expression import Expression, substitute, symbol
 from phigen.targets.c.kernels import FUNCTIONS, each_lane, printer
@@ -31,10 +33,11 @@ LONGEST_LOOP = 60
 
 
 def stack(program: Program, slope_terms: int) -> tuple[int, int]:
-    """Values in each lane on the stack: of a model, beside those of any driver, and of an expansion."""
-    if program.path is None or program.path_slopes is None:
+    """Values in each lane on the stack: of a model, beside those of any step, and of an expansion."""
+    step, n = program.step, program.dimension
+    if not isinstance(step, Path) or step.lanes is None:
         return 0, 0
-    n, path, slopes = program.dimension, program.path, program.path_slopes
+    path, slopes = step.recurrences, step.lanes.slopes
     series = len(path.series) * (TERMS + 3) + len(slopes.series) * (slope_terms + 2)
     fixed = len(path.fixed) + len(slopes.fixed)
     return n + 2 * n * n, series + fixed + 2 * n * n * (slope_terms + 4) + 2 * n * n + 8 * n
@@ -42,7 +45,7 @@ def stack(program: Program, slope_terms: int) -> tuple[int, int]:
 
 def model_members(program: Program) -> list[str]:
     """What a model remembers of the path in its lane."""
-    if program.path is None:
+    if not isinstance(program.step, Path):
         return []
     name, n = program.name, program.dimension
     return [
@@ -51,12 +54,9 @@ def model_members(program: Program) -> list[str]:
     ]
 
 
-def kernels(program: Program) -> list[Kernel]:
+def kernels(program: Program, step: Path, lanes: PathLanes) -> list[Kernel]:
     """The kernels at one point: p = ∇S_h with its derivative, and without; first coefficients of all series."""
-    assert program.path is not None
-    assert program.path_slopes is not None
-    path, slopes, coordinates = program.path, program.path_slopes, program.coordinates
-    curvature = program.kernels["curvature"]
+    path, slopes, curvature, coordinates = step.recurrences, lanes.slopes, lanes.curvature, program.coordinates
     coef, covector = curvature.inputs["coef"], tuple(momentum(c) for c in coordinates)
     values = _resolved(path.series, path.fixed, {})
     base = {f"s:{i}" for i in range(len(path.series))} | {f"f:{i}" for i in range(len(path.fixed))}
@@ -81,16 +81,15 @@ def kernels(program: Program) -> list[Kernel]:
             },
             (Output("slope", further[0]), Output("slope_fixed", further[1])),
         ),
-        program.kernels["along_mean"],
-        program.kernels["invert"],
+        lanes.along_mean,
+        lanes.invert,
     ]
 
 
-def pieces(program: Program, values: Mapping[str, Any], slope_terms: int) -> list[str]:
+def pieces(program: Program, step: Path, lanes: PathLanes, values: Mapping[str, Any], slope_terms: int) -> list[str]:
     """A stage in all lanes: `NAME_update` and what it calls."""
-    assert program.path is not None
-    assert program.path_slopes is not None
-    path, slopes, n = program.path, program.path_slopes, program.dimension
+    path, slopes, n = step.recurrences, lanes.slopes, program.dimension
+    show = _Show(program, path, slopes)
     every = [*path.series, *slopes.series]
     base = len(path.series)
     own = {
@@ -106,11 +105,15 @@ def pieces(program: Program, values: Mapping[str, Any], slope_terms: int) -> lis
         "n2_twice": 2 * n * n,
         "slopes": ", ".join(map(str, path.slopes)),
         "follow": [
-            ("follow", "the series that follow from those of the coordinates", *_rules(program, every, range(n, base))),
-            ("follow_slopes", "the further series", *_rules(program, every, range(base, len(every)))),
+            (
+                "follow",
+                "the series that follow from those of the coordinates",
+                *_rules(program, show, every, range(n, base)),
+            ),
+            ("follow_slopes", "the further series", *_rules(program, show, every, range(base, len(every)))),
         ],
-        "vary": _variation(program, slopes.jacobian),
-        "source": _source(program, slopes),
+        "vary": _variation(show, slopes.jacobian),
+        "source": _source(show, slopes),
     }
     return [render("c", f"{template}.c", own) for template in TEMPLATES]
 
@@ -132,49 +135,51 @@ def _resolved(
     return tuple(values), tuple(fixed)
 
 
-def _place(program: Program, i: int) -> str:
-    """The series of a number."""
-    assert program.path is not None
-    base = len(program.path.series)
-    return f"e->s[{i}]" if i < base else f"e->slope[{i - base}]"
+class _Show:
+    """Prints what refers to series, in one lane."""
+
+    def __init__(self, program: Program, path: Recurrences, slopes: PathSlopes) -> None:
+        self._base, self.dimension = len(path.series), program.dimension
+        scope = Scope(())
+        for i, c in enumerate(program.coordinates):
+            scope.bind(momentum(c), f"e->p[{i}][lane]")
+        for i in range(program.step.coefficients):
+            scope.bind(f"c:{i}", f"coef[{i}][lane]")
+        for i in range(len(path.series) + len(slopes.series)):
+            scope.bind(f"s:{i}", f"{self.series(i)}[0][lane]")
+        for i in range(len(path.fixed) + len(slopes.fixed)):
+            own = i - len(path.fixed)
+            scope.bind(f"f:{i}", f"e->fixed[{i}][lane]" if own < 0 else f"e->slope_fixed[{own}][lane]")
+        self._printer = printer(scope, FUNCTIONS)
+
+    def series(self, i: int) -> str:
+        """The series of a number."""
+        return f"e->s[{i}]" if i < self._base else f"e->slope[{i - self._base}]"
+
+    def __call__(self, e: Expression) -> str:
+        """An expression as C."""
+        return self._printer(expand_powers([e])[0])
 
 
-def _printer(program: Program) -> Any:
-    assert program.path is not None
-    assert program.path_slopes is not None
-    path, slopes = program.path, program.path_slopes
-    scope = Scope(())
-    for i, c in enumerate(program.coordinates):
-        scope.bind(momentum(c), f"e->p[{i}][lane]")
-    for i in range(program.coefficients):
-        scope.bind(f"c:{i}", f"coef[{i}][lane]")
-    for i in range(len(path.series) + len(slopes.series)):
-        scope.bind(f"s:{i}", f"{_place(program, i)}[0][lane]")
-    for i in range(len(path.fixed) + len(slopes.fixed)):
-        own = i - len(path.fixed)
-        scope.bind(f"f:{i}", f"e->fixed[{i}][lane]" if own < 0 else f"e->slope_fixed[{own}][lane]")
-    show = printer(scope, FUNCTIONS)
-    return lambda e: show(expand_powers([e])[0])
-
-
-def _rules(program: Program, every: Sequence[Series], numbers: range) -> tuple[list[str], int, list[str], list[str]]:
+def _rules(
+    program: Program, show: _Show, every: Sequence[Series], numbers: range
+) -> tuple[list[str], int, list[str], list[str]]:
     """Coefficient k ≥ 1 of the series of these numbers: the first lines of the function, the count of sums over orders,
     loops over lanes that add what orders j and k − j contribute to these, and loops for the rest, which may need
     coefficients of order k."""
     between: list[str] = []
     ends: list[str] = []
-    show = _printer(program)
     for i in numbers:
         q, parts = every[i], []
         for t in q.terms:
-            weight, share, end = _orders(program, t)
+            weight, share, end = _orders(show, t)
             parts.append(f"{share}sum[{len(between)}][lane] + {end}")
-            a, b = _place(program, t.a), _place(program, t.b)
+            a, b = show.series(t.a), show.series(t.b)
             between.append(f"sum[{len(between)}][lane] += {weight}{a}[j][lane] * {b}[k - j][lane];")
-        value = " + ".join(parts) or _linear(program, q, show) or "0.0"
+        value = " + ".join(parts) or _linear(show, q) or "0.0"
         if q.divisor is not None:
-            value = f"({value}) / {_place(program, q.divisor)}[0][lane]"
-        ends.append(f"{_place(program, i)}[k][lane] = {value};")
+            value = f"({value}) / {show.series(q.divisor)}[0][lane]"
+        ends.append(f"{show.series(i)}[k][lane] = {value};")
     text = "\n".join([*between, *ends])
     head = ["const double share = 1.0 / k;"] if "share" in text else []
     head += [f"(void){name};" for name, use in (("coef", "coef["), ("e", "e->")) if use not in text]
@@ -191,10 +196,10 @@ def _loops(program: Program, statements: Sequence[str]) -> list[str]:
     return lines
 
 
-def _orders(program: Program, t: Term) -> tuple[str, str, str]:
+def _orders(show: _Show, t: Term) -> tuple[str, str, str]:
     """Of one sum over orders j (see `Term`): the weight of a_j b_{k-j}, what the sum is multiplied by, the terms that
     it leaves out, with a coefficient of order 0."""
-    a, b = _place(program, t.a), _place(program, t.b)
+    a, b = show.series(t.a), show.series(t.b)
     last = f"{a}[k][lane] * {b}[0][lane]"
     match t.kind:
         case "product" if t.a == t.b:
@@ -207,10 +212,10 @@ def _orders(program: Program, t: Term) -> tuple[str, str, str]:
     return f"(({r} + 1.0) * j - k) * ", "share * ", f"{r} * {last}"
 
 
-def _linear(program: Program, q: Series, show: Any) -> str:
+def _linear(show: _Show, q: Series) -> str:
     text = ""
     for index, factor in q.linear:
-        value = f"{_place(program, index)}[k][lane]"
+        value = f"{show.series(index)}[k][lane]"
         if factor.is_number and abs(factor.value) == 1:
             sign = "-" if factor.value < 0 else "+"
         else:
@@ -219,10 +224,10 @@ def _linear(program: Program, q: Series, show: Any) -> str:
     return text
 
 
-def _variation(program: Program, jacobian: Sequence[Entry]) -> list[str]:
+def _variation(show: _Show, jacobian: Sequence[Entry]) -> list[str]:
     """The product of ∂(π p)/∂m and the derivatives so far, to be added."""
-    n = program.dimension
-    lines = [f"const double a{e.row}{e.column} = share * {_place(program, e.series)}[j][lane];" for e in jacobian]
+    n = show.dimension
+    lines = [f"const double a{e.row}{e.column} = share * {show.series(e.series)}[j][lane];" for e in jacobian]
     for row in range(n):
         columns = [e.column for e in jacobian if e.row == row]
         for k in range(2 * n if columns else 0):
@@ -231,10 +236,10 @@ def _variation(program: Program, jacobian: Sequence[Entry]) -> list[str]:
     return lines or ["(void)from, (void)to, (void)share;"]
 
 
-def _source(program: Program, slopes: PathSlopes) -> list[str]:
+def _source(show: _Show, slopes: PathSlopes) -> list[str]:
     """What order k of ∂(π p)/∂m contributes by itself, and half of π: the derivative along p is that of ½π(m)p."""
-    n = program.dimension
+    n = show.dimension
     along_m = [(e.row * 2 * n + e.column, "share", e) for e in slopes.jacobian]
     along_p = [(e.row * 2 * n + n + e.column, "0.5 * share", e) for e in slopes.tensor]
     every = [*along_m, *along_p]
-    return [f"to[{i}][lane] += {factor} * {_place(program, e.series)}[k][lane];" for i, factor, e in every]
+    return [f"to[{i}][lane] += {factor} * {show.series(e.series)}[k][lane];" for i, factor, e in every]

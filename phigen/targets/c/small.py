@@ -7,6 +7,7 @@ from collections.abc import Mapping, Set
 from fractions import Fraction
 
 from phigen.scheme.program import Program
+from phigen.scheme.steps import Splitting
 from phigen.symbolic.entire import ENTIRE
 from phigen.symbolic.expression import topological
 from phigen.targets.polynomials import estrin
@@ -50,9 +51,10 @@ _FAR = {
 
 def pieces(program: Program) -> list[str]:
     """The functions of `ENTIRE` that kernels call, and for a splitting those that flows call."""
-    flows = [kernel for name, kernel in program.kernels.items() if name.startswith(("flow", "tangent"))]
+    step = program.step
+    flows = (*step.flows, *step.tangents) if isinstance(step, Splitting) else ()
     used = {e.op for e in topological([e for kernel in flows for e in kernel.roots])}
-    called = [f for f in FLOW_FUNCTIONS if program.schedule and f in used]
+    called = [f for f in FLOW_FUNCTIONS if f in used]
     return [render("c", "small.c", _values(program, f)) for f in (*entire_used(program), *called)]
 
 

@@ -5,50 +5,52 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
-from phigen.scheme.alternation import Schedule
-from phigen.scheme.program import Kernel, Output, Program
+from phigen.scheme.kernel import Kernel, Output
+from phigen.scheme.program import Program
+from phigen.scheme.steps import Splitting
 from phigen.targets.c.kernels import FUNCTIONS, function
 from phigen.targets.c.small import FLOW_FUNCTIONS
 from phigen.targets.rendering import render
 
 
-def pieces(program: Program, values: Mapping[str, object]) -> list[str]:
-    """The functions of the driver."""
-    kernels, schedule, own = program.kernels, schedule_of(program), {**values, **_values(program)}
-    prepare = function(program, replace(kernels["prepare"], name="prepare_row")) + "\n"
+def pieces(program: Program, step: Splitting, values: Mapping[str, object]) -> list[str]:
+    """The functions of the step."""
+    own = {**values, **_values(step)}
+    prepare = function(program, replace(step.prepare, name="prepare_row")) + "\n"
     found, functions = [prepare, render("c", "add.c", values)], _functions(program)
-    for k, name in enumerate(_flows(program), 1):
-        kernel, moved = _compact(kernels[name], k)
+    for k, flow in enumerate(step.flows, 1):
+        kernel, moved = _compact(flow, k)
         found.append(function(program, kernel, functions=functions) + "\n")
         found.append(
             render("c", "flow.c", own | {"k": k, "moved": list(enumerate(moved)), "count": max(1, len(moved))})
         )
-    rows = "rows_kicks.c" if schedule.multiples else "rows.c"
-    step = _step(program, schedule, "", "x, moved, s->x")
-    return [*found, render("c", rows, own), render("c", "splitting.c", own | {"step": step})]
+    rows = "rows_kicks.c" if step.schedule.multiples else "rows.c"
+    calls = _calls(program, step, "", "x, moved, s->x")
+    return [*found, render("c", rows, own), render("c", "splitting.c", own | {"step": calls})]
 
 
-def in_lanes(program: Program, values: Mapping[str, object], form: str, functions: Mapping[str, str]) -> list[str]:
+def in_lanes(
+    program: Program, step: Splitting, values: Mapping[str, object], form: str, functions: Mapping[str, str]
+) -> list[str]:
     """Steps of the members of packs, which call ``functions``; ``form`` is added to the names."""
     found, end = [], f"{form}_lanes"
-    for k, name in enumerate(_flows(program), 1):
-        kernel, moved = _compact(program.kernels[name], k)
+    for k, flow in enumerate(step.flows, 1):
+        kernel, moved = _compact(flow, k)
         kernel = replace(kernel, name=kernel.name + form)
         found.append(function(program, kernel, lanes=True, shared=["coef"], functions=functions) + "\n")
         own = {"k": k, "form": end, "moved": list(enumerate(moved)), "count": max(1, len(moved))}
         found.append(render("c", "flow_lanes.c", {**values, **own}))
-    step = _step(program, schedule_of(program), end, "pack, packs")
-    return [*found, render("c", "splitting_lanes.c", {**values, "form": end, "step": step})]
+    calls = _calls(program, step, end, "pack, packs")
+    return [*found, render("c", "splitting_lanes.c", {**values, "form": end, "step": calls})]
 
 
-def tangent(program: Program, values: Mapping[str, object]) -> list[str]:
+def tangent(program: Program, step: Splitting, values: Mapping[str, object]) -> list[str]:
     """The derivative of a step."""
-    kernels = [program.kernels[f"tangent{k}"] for k, _ in enumerate(_flows(program), 1)]
-    found = [function(program, kernel, functions=_functions(program)) + "\n" for kernel in kernels]
-    flows, count = schedule_of(program).flows, len(_flows(program))
+    found = [function(program, kernel, functions=_functions(program)) + "\n" for kernel in step.tangents]
+    flows, count = step.schedule.flows, len(step.flows)
     own = {
         **values,
-        **_values(program),
+        **_values(step),
         "flows": len(flows),
         "parts": [*((f"case {k}", k) for k in range(1, count)), ("default", count)],
         "part_of": ", ".join(str(part + 1) for part, _ in flows),
@@ -57,30 +59,18 @@ def tangent(program: Program, values: Mapping[str, object]) -> list[str]:
     return [*found, render("c", "tangent_splitting.c", own)]
 
 
-def schedule_of(program: Program) -> Schedule:
-    """The schedule of a splitting."""
-    if program.schedule is None:
-        raise ValueError(f"{program.name} is no splitting")
-    return program.schedule
-
-
 def _functions(program: Program) -> dict[str, str]:
     """What flows call functions: those that have a version for small arguments."""
     return FUNCTIONS | {f: f"{program.name}_{f}" for f in FLOW_FUNCTIONS}
 
 
-def _flows(program: Program) -> list[str]:
-    return [name for name in program.kernels if name.startswith("flow")]
-
-
-def _values(program: Program) -> dict[str, object]:
-    schedule = schedule_of(program)
-    times = schedule.times
+def _values(step: Splitting) -> dict[str, object]:
+    schedule = step.schedule
     return {
-        "rows": len(times),
-        "times": ", ".join(repr(t) for t in times),
+        "rows": len(schedule.times),
+        "times": ", ".join(repr(t) for t in schedule.times),
         "multiples": ", ".join(repr(m) for m in schedule.multiples),
-        "row": max(1, program.coefficients // len(times)),
+        "row": max(1, step.row),
     }
 
 
@@ -92,9 +82,9 @@ def _compact(kernel: Kernel, k: int) -> tuple[Kernel, list[int]]:
     return replace(kernel, name=f"change{k}", outputs=(output,)), moved
 
 
-def _step(program: Program, schedule: Schedule, end: str, moved: str) -> list[str]:
+def _calls(program: Program, step: Splitting, end: str, moved: str) -> list[str]:
     """The calls of a step: of functions whose names end so, with what they move."""
-    name, row = program.name, _values(program)["row"]
+    name, row, schedule = program.name, max(1, step.row), step.schedule
     lines = [f"{name}_flow1{end}(coef, {moved});"]
     if schedule.stages:
         lines += [f"coef += {row};", f"for (int k = 0; k < {schedule.stages}; ++k) {{"]

@@ -6,8 +6,9 @@ import textwrap
 from collections.abc import Sequence
 from dataclasses import replace
 
-from phigen.scheme.alternation import Schedule
-from phigen.scheme.program import PLAUSIBLE, Kernel, Program
+from phigen.scheme.kernel import Kernel
+from phigen.scheme.program import Program
+from phigen.scheme.steps import PLAUSIBLE, Explicit, Implicit, InnerSolve, Newton, Path, Splitting
 from phigen.symbolic.entire import ENTIRE
 from phigen.symbolic.expression import Expression
 from phigen.symbolic.special import SPECIAL
@@ -59,98 +60,105 @@ PATH_SYNTAX = Syntax(
 
 def emit(program: Program, command: str) -> dict[str, str]:
     """The file name and its contents."""
-    kernels = program.kernels
+    seen, gauge = program.observables, program.gauge
     pieces = [render("numpy", "preamble.py", _values(program))]
     pieces += [render("numpy", "phi.py", special.values(f, f"_{f}")) for f in special.used(program)]
     pieces += [render("numpy", "entire.py", special.entire_values(f)) for f in special.entire_used(program)]
-    pieces += _driver(program)
-    gauge = ("gauge_line.py", "gauge.py") if program.gauge else ("no_gauge.py",)
-    pieces += [render("numpy", template, _values(program)) for template in gauge]
-    pieces += [_function(program, kernels[k]) for k in ("guide", "products") if k in kernels]
+    pieces += _step(program)
+    templates = ("gauge_line.py", "gauge.py") if gauge else ("no_gauge.py",)
+    pieces += [render("numpy", template, _values(program)) for template in templates]
+    pieces += [_function(program, kernel) for kernel in (gauge.guide, gauge.products)] if gauge else []
     pieces += [render("numpy", part, _values(program)) for part in ("coefficients.py", "api.py")]
-    pieces += [_function(program, kernels[k]) for k in ("energy", "casimirs", "vector_field")]
+    pieces += [_function(program, kernel) for kernel in (seen.energy, seen.casimirs, seen.vector_field)]
     pieces += [render("numpy", "observables.py", _values(program))]
     if program.extras.tangent:
         pieces += _tangent(program)
-    if "modified" in kernels:
-        order = program.order + (2 if program.symmetric else 1) * program.extras.modified_hamiltonian
-        pieces += [_function(program, kernels["modified"]), render("numpy", "modified.py", {"modified_power": order})]
+    if program.modified:
+        values = {"modified_power": program.modified.power}
+        pieces += [_function(program, program.modified.kernel), render("numpy", "modified.py", values)]
     body = "\n\n".join(p.strip("\n") + "\n" for p in pieces)
     comment = "\n".join(f"# {line}".rstrip() for line in header_lines(program, command))
     return {f"{program.name}.py": f"{comment}\n# {CHECKSUM} {checksum(body)}\n{body}"}
 
 
-def _driver(program: Program) -> list[str]:
+def _step(program: Program) -> list[str]:
     """The functions that make a stage."""
-    kernels, values = program.kernels, _values(program)
-    if program.schedule:
-        row = _function(program, replace(kernels["prepare"], name="prepare_row"))
-        flows = [_function(program, kernel) for name, kernel in kernels.items() if name.startswith("flow")]
-        own = values | _splitting_values(program, program.schedule)
-        rows = "rows_kicks.py" if program.schedule.multiples else "rows.py"
-        return [row, *flows, render("numpy", "splitting.py", own), render("numpy", rows, own)]
-    prepare = _function(program, kernels["prepare"])
-    if program.driver == "explicit":
-        return [prepare, _function(program, kernels["explicit"]), render("numpy", "explicit.py", values)]
-    if program.path:
-        path = values | statements(program, program.path, PATH_SYNTAX)
-        parts = ("holds", "piece", "path", "residual", "solve", "plausible", "path_step")
-        generate = _function(program, kernels["generate"])
-        return [prepare, generate, *(render("numpy", f"{part}.py", path) for part in parts)]
-    linearise = _function(program, kernels["linearise"])
-    return [prepare, linearise, *(render("numpy", f"{part}.py", values) for part in ("solve", "plausible", "newton"))]
+    values = _values(program)
+
+    def rendered(*parts: str) -> list[str]:
+        return [render("numpy", f"{part}.py", values) for part in parts]
+
+    match program.step:
+        case Splitting(prepare=prepare, flows=flows, schedule=schedule) as step:
+            values |= _splitting_values(step)
+            row = _function(program, replace(prepare, name="prepare_row"))
+            rows = "rows_kicks" if schedule.multiples else "rows"
+            return [row, *(_function(program, flow) for flow in flows), *rendered("splitting", rows)]
+        case Explicit(prepare=prepare, increment=increment):
+            return [_function(program, prepare), _function(program, increment), *rendered("explicit")]
+        case Path(prepare=prepare, recurrences=path, generate=generate):
+            values |= statements(program, path, PATH_SYNTAX)
+            parts = rendered("holds", "piece", "path", "residual", "solve", "plausible", "path_step")
+            return [_function(program, prepare), _function(program, generate), *parts]
+        case Newton(prepare=prepare, linearise=linearise):
+            parts = rendered("solve", "plausible", "newton")
+            return [_function(program, prepare), _function(program, linearise), *parts]
 
 
-def _splitting_values(program: Program, schedule: Schedule) -> dict[str, object]:
-    count = sum(name.startswith("flow") for name in program.kernels)
+def _splitting_values(step: Splitting) -> dict[str, object]:
+    schedule, numbers = step.schedule, range(1, len(step.flows) + 1)
     return {
         "times": "(" + "".join(f"{t!r}, " for t in schedule.times).rstrip() + ")",
         "multiples": "(" + "".join(f"{m!r}, " for m in schedule.multiples).rstrip() + ")",
-        "row": program.coefficients // len(schedule.times),
+        "row": step.row,
         "schedule": repr(tuple(schedule.flows)),
-        "flows": ", ".join(f"_flow{k}" for k in range(1, count + 1)),
-        "tangents": ", ".join(f"_tangent{k}" for k in range(1, count + 1)),
+        "flows": ", ".join(f"_flow{k}" for k in numbers),
+        "tangents": ", ".join(f"_tangent{k}" for k in numbers),
     }
 
 
 def _tangent(program: Program) -> list[str]:
     """The tangent map of a step, with what it needs."""
-    values, pieces = _values(program), []
-    if program.schedule:
-        values |= _splitting_values(program, program.schedule)
-        pieces += [_function(program, k) for name, k in program.kernels.items() if name.startswith("tangent")]
-    elif program.driver == "explicit":
-        pieces += [_function(program, program.kernels["explicit_tangent"])]
-    elif program.tangent_path:
-        extended = tangent_program(program)
-        path = program.tangent_path
-        values |= statements(extended, path, PATH_SYNTAX)
-        values |= {"series": len(path.series), "n_twice": extended.dimension}
-        pieces += [_function(program, program.kernels["curvature"])]
-        pieces += [render("numpy", f"tangent_{part}.py", values) for part in ("holds", "piece", "seeds")]
-    pieces.append(render("numpy", f"tangent_{program.driver}.py", values))
+    values, kernels, parts = _values(program), list[Kernel](), list[str]()
+    match program.step:
+        case Splitting(tangents=tangents) as step:
+            values |= _splitting_values(step)
+            kernels, parts = list(tangents), ["splitting"]
+        case Explicit(tangent=tangent) if tangent:
+            kernels, parts = [tangent], ["explicit"]
+        case Path(tangent=varied) if varied:
+            extended, path = tangent_program(program), varied.recurrences
+            values |= statements(extended, path, PATH_SYNTAX)
+            values |= {"series": len(path.series), "n_twice": extended.dimension}
+            kernels, parts = [varied.curvature], ["holds", "piece", "seeds", "path"]
+        case Newton():
+            parts = ["newton"]
+    pieces = [_function(program, kernel) for kernel in kernels]
+    pieces += [render("numpy", f"tangent_{part}.py", values) for part in parts]
     return [*pieces, render("numpy", "tangent.py", values)]
 
 
 def _values(program: Program) -> dict[str, object]:
+    step = program.step
+    inner = step.inner if isinstance(step, Implicit) else InnerSolve()
     return {
-        "title": plain(program.title) or program.name,
+        "title": plain(program.about.title) or program.name,
         "n": program.dimension,
         "order": program.order,
         "version": program.version,
-        "sha256": program.spec_sha256,
+        "sha256": program.about.spec_sha256,
         "coordinates": _strings(program.coordinates),
         "casimirs": _strings(program.casimirs),
         "defaults": [f'"{p.name}": {float(p.value)!r}' for p in program.parameters],
-        "gauge": _strings(program.gauge),
+        "gauge": _strings(program.gauge.casimirs if program.gauge else ()),
         "plausible": repr(PLAUSIBLE),
         "fractions": "(" + "".join(f"{f!r}, " for f in program.fractions).rstrip() + ")",
         "terms": TERMS,
-        "series": len(program.path.series) if program.path else 0,
-        "max_iterations": program.max_iterations,
-        "tolerance": repr(program.tolerance),
+        "series": len(step.recurrences.series) if isinstance(step, Path) else 0,
+        "max_iterations": inner.max_iterations,
+        "tolerance": repr(inner.tolerance),
         # The floor of the scale of a component: see _size.
-        "floor": "0.0" if program.relative else "1e-6",
+        "floor": "0.0" if inner.relative else "1e-6",
     }
 
 

@@ -1,0 +1,189 @@
+"""The kinds of steps, each with the kernels that make it: ``Step = Newton | Explicit | Path | Splitting``.
+
+Kernels of a step are of two stages. ``prepare`` computes, from parameters and step size, every value that does not
+depend on the state: the coefficients ``c:0``, ``c:1``, …. All others read these and the state only.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from phigen.scheme.alternation import Schedule
+from phigen.scheme.kernel import Kernel
+from phigen.scheme.path import PathSlopes, Recurrences
+
+#: How far an implicit step may lead, in sizes of the state and of what the vector field says, if the energy is lost.
+PLAUSIBLE = 1.5
+
+
+@dataclass(frozen=True)
+class _Staged:
+    """Any step."""
+
+    prepare: Kernel
+
+    @property
+    def row(self) -> int:
+        """Values that ``prepare`` computes in one call."""
+        return len(self.prepare.outputs[0].values)
+
+    @property
+    def coefficients(self) -> int:
+        """Coefficients of one stage."""
+        return self.row
+
+
+@dataclass(frozen=True)
+class InnerSolve:
+    """How the equation of an implicit step is solved.
+
+    ``relative`` tells that the coordinates are positive or keep their sign (log-canonical π), so that errors count
+    relative to each coordinate.
+    """
+
+    max_iterations: int = 20
+    tolerance: float = 1e-20
+    relative: bool = False
+
+
+@dataclass(frozen=True)
+class Factorisation:
+    """A Newton matrix with many zeros: ``factorise`` it once, then ``substitute`` right-hand sides."""
+
+    factorise: Kernel
+    substitute: Kernel
+
+
+@dataclass(frozen=True)
+class Newton(_Staged):
+    """α(y, ∇S_h(y)) = x, solved for y by Newton's method; then x + (β − α)(y, ∇S_h(y)).
+
+    ``eliminate`` solves with one matrix; of ``invert`` and ``factors``, for many right-hand sides, there is at most
+    one. What is None is left to a loop.
+    """
+
+    linearise: Kernel
+    inner: InnerSolve
+    eliminate: Kernel | None = None
+    invert: Kernel | None = None
+    factors: Factorisation | None = None
+
+    #: What the operation counts of `main` refer to.
+    unit = "Newton iteration"
+    #: What the header says of the step.
+    manner = "implicit, Newton iteration with the analytic matrix"
+
+    @property
+    def main(self) -> Kernel:
+        """The kernel that takes most of the time."""
+        return self.linearise
+
+    @property
+    def kernels(self) -> tuple[Kernel, ...]:
+        """All kernels, each once."""
+        factors = (self.factors.factorise, self.factors.substitute) if self.factors else ()
+        return _present((self.prepare, self.linearise, self.eliminate, self.invert, *factors))
+
+
+@dataclass(frozen=True)
+class Explicit(_Staged):
+    """The increment of a step as a formula; ``tangent`` is its Jacobian, if the tangent map was asked for."""
+
+    increment: Kernel
+    tangent: Kernel | None = None
+
+    unit = "step"
+    manner = "explicit"
+
+    @property
+    def main(self) -> Kernel:
+        """The kernel that takes most of the time."""
+        return self.increment
+
+    @property
+    def kernels(self) -> tuple[Kernel, ...]:
+        """All kernels, each once."""
+        return _present((self.prepare, self.increment, self.tangent))
+
+
+@dataclass(frozen=True)
+class PathLanes:
+    """What following several paths at once needs: the recurrences of the derivatives of a path, and their use."""
+
+    slopes: PathSlopes
+    curvature: Kernel
+    along_mean: Kernel
+    invert: Kernel
+
+
+@dataclass(frozen=True)
+class PathTangent:
+    """The path with its variation (`phigen.scheme.tangent`), and the Hessian of S_h at its mean."""
+
+    recurrences: Recurrences
+    curvature: Kernel
+
+
+@dataclass(frozen=True)
+class Path(_Staged):
+    """p = ∇S_h at the mean of the path ṁ = π(m)p, solved for p; α and β are the ends of the path."""
+
+    recurrences: Recurrences
+    generate: Kernel
+    inner: InnerSolve
+    eliminate: Kernel | None = None
+    lanes: PathLanes | None = None
+    tangent: PathTangent | None = None
+
+    unit = "evaluation of the equation for p"
+    manner = "implicit in p, each path followed by its Taylor series to round-off"
+
+    @property
+    def main(self) -> Kernel:
+        """The kernel that takes most of the time, but for the recurrences."""
+        return self.generate
+
+    @property
+    def kernels(self) -> tuple[Kernel, ...]:
+        """All kernels, each once."""
+        lanes = (self.lanes.curvature, self.lanes.along_mean, self.lanes.invert) if self.lanes else ()
+        varied = (self.tangent.curvature,) if self.tangent and not self.lanes else ()
+        return _present((self.prepare, self.generate, self.eliminate, *lanes, *varied))
+
+
+@dataclass(frozen=True)
+class Splitting(_Staged):
+    """The exact flows of the parts of H, one after another as the ``schedule`` lists them.
+
+    ``prepare`` computes a row of coefficients for each row of the schedule. ``composition`` is the name of the method;
+    ``tangents`` are the Jacobians of the increments of the flows, if the tangent map was asked for.
+    """
+
+    flows: tuple[Kernel, ...]
+    schedule: Schedule
+    composition: str
+    tangents: tuple[Kernel, ...] = ()
+
+    unit = "step"
+    manner = "explicit"
+
+    @property
+    def coefficients(self) -> int:
+        """Coefficients of one step, in all rows."""
+        return self.row * len(self.schedule.times)
+
+    @property
+    def kernels(self) -> tuple[Kernel, ...]:
+        """All kernels, each once."""
+        return (self.prepare, *self.flows, *self.tangents)
+
+
+Step = Newton | Explicit | Path | Splitting
+
+#: Those that solve an equation.
+Implicit = Newton | Path
+
+
+def _present(kernels: Iterable[Kernel | None]) -> tuple[Kernel, ...]:
+    return tuple(k for k in kernels if k is not None)
