@@ -6,12 +6,12 @@ neither for sympy nor for numpy.
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
-
 from phigen._version import __version__
 
+TYPE_CHECKING = False  # not of typing, whose import takes longer than all of this
 if TYPE_CHECKING:
+    from typing import Any
+
     from phigen.api import compile, load
     from phigen.errors import CheckError, LimitError, PhigenError, SpecError, StepError, ToolchainError
     from phigen.geometry.system import System
@@ -51,6 +51,8 @@ __all__ = [
 def __getattr__(name: str) -> Any:
     if name not in _HOMES:
         raise AttributeError(f"module 'phigen' has no attribute {name!r}")
+    from importlib import import_module
+
     value = getattr(import_module(_HOMES[name]), name)
     globals()[name] = value
     return value

@@ -1,5 +1,16 @@
-"""``python -m phigen`` is the command ``phigen``."""
+"""The command ``phigen``, as a script and as ``python -m phigen``."""
 
-from phigen.cli import main
+from phigen import interrupts
 
-main()
+interrupts.obey()  # before the imports that take time
+
+
+def main() -> None:
+    """Run the command line."""
+    from phigen.cli import main as run
+
+    run()
+
+
+if __name__ == "__main__":
+    main()

@@ -13,6 +13,7 @@ from typing import Any
 
 import click
 
+from phigen import interrupts
 from phigen._version import __version__
 from phigen.cli import failures
 from phigen.cli.console import Console
@@ -72,9 +73,12 @@ class Commands(click.Group):
         """Run a command and end the process with its exit code; see `phigen.errors` for the codes."""
         console = extra.setdefault("obj", Console())
         try:
+            interrupts.working = True
             done = super().main(args, prog_name, standalone_mode=False, **extra)
+            interrupts.working = False
             code = done if isinstance(done, int) else 0
-        except Exception as error:
+        except (Exception, KeyboardInterrupt) as error:
+            interrupts.working = False
             code = failures.report(error, console)
         if standalone_mode:
             sys.exit(code)

@@ -10,11 +10,11 @@ from contextlib import contextmanager
 
 import click
 
+from phigen import interrupts
 from phigen._version import __version__
 from phigen.cli.console import Console
 from phigen.errors import PhigenError, SpecError
 
-INTERRUPTED = 130
 #: What a shell reports of a process that SIGPIPE ended.
 BROKEN_PIPE = 141
 USAGE = 2
@@ -51,11 +51,11 @@ class Collector:
             raise SeveralError(self.errors)
 
 
-def report(error: Exception, console: Console) -> int:
+def report(error: BaseException, console: Console) -> int:
     """Say what failed, and return the exit code."""
     if isinstance(error, click.exceptions.Abort) or _is_interrupt(error):
         console.error("interrupted")
-        return INTERRUPTED
+        return interrupts.CODE
     match error:
         case click.ClickException():
             error.show()
@@ -94,7 +94,7 @@ def _described(error: PhigenError) -> str:
     return text if isinstance(error, SpecError) or ": error:" in text.split("\n")[0] else f"error: {text}"
 
 
-def _internal(error: Exception, console: Console) -> int:
+def _internal(error: BaseException, console: Console) -> int:
     summary = "".join(traceback.format_exception_only(error)).strip()
     if isinstance(error, MemoryError):
         summary = "out of memory"
@@ -106,5 +106,5 @@ def _internal(error: Exception, console: Console) -> int:
     return PhigenError.exit_code
 
 
-def _show_traceback(error: Exception, console: Console) -> None:
+def _show_traceback(error: BaseException, console: Console) -> None:
     console.error("".join(traceback.format_exception(error)).rstrip())

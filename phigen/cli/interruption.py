@@ -9,13 +9,14 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from types import FrameType
 
+from phigen import interrupts
 from phigen.errors import PhigenError
 
 
 class InterruptedRunError(PhigenError):
     """A run was stopped by the user or the system."""
 
-    exit_code = 130
+    exit_code = interrupts.CODE
 
 
 @dataclass

@@ -222,6 +222,56 @@ def test_interrupt_is_130(write):
     assert "Traceback" not in message
 
 
+#: Interrupts itself when a condition on the function called, and on its module if it is an import, first holds.
+INTERRUPTED_ONCE = """
+import atexit, os, runpy, signal, sys
+
+def watch(frame, event, argument):
+    function, module = frame.f_code.co_name, frame.f_locals.get("name")
+    if event == "call" and ({condition}):
+        sys.setprofile(None)
+        os.kill(os.getpid(), signal.SIGINT)
+
+sys.setprofile(watch)
+sys.argv[1:] = ["check", "a.yaml"]
+runpy.run_module("phigen", run_name="__main__")
+"""
+
+
+@pytest.mark.parametrize(
+    "moment",
+    [
+        "function == '_find_and_load' and module == 'phigen.cli'",
+        "function == '_find_and_load' and module == 'zlib'",  # by flint, which makes an ImportError of it
+        "function == 'system_from_spec'",
+        "function == 'remove' and 'weakref' in frame.f_code.co_filename",  # a callback, whose exceptions are ignored
+        "function == '_shutdown'",  # when all is done
+    ],
+)
+def test_interrupt_at_any_moment_is_130_and_one_word(write, moment):
+    write("a.yaml")
+    code = INTERRUPTED_ONCE.format(condition=moment)
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    said = [line for line in done.stderr.splitlines() if line and not line.startswith("a.yaml: ")]
+    assert (done.returncode, said) == (130, ["interrupted"])
+
+
+def test_second_interrupt_ends_what_tidies_up(write):
+    code = """
+import os, signal
+from phigen import interrupts
+interrupts.obey()
+interrupts.working = True
+try:
+    os.kill(os.getpid(), signal.SIGINT)
+finally:
+    os.kill(os.getpid(), signal.SIGINT)
+    print("not reached")
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "interrupted\n")
+
+
 def test_interrupt_inside_an_import_is_no_internal_error(phigen, write, monkeypatch):
     def broken(*args, **kwargs):
         try:
