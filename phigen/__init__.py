@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from typing import Any
 
     from phigen.api import compile, load
-    from phigen.errors import CheckError, LimitError, PhigenError, SpecError, StepError, ToolchainError
+    from phigen.errors import CheckError, LimitError, ParameterError, PhigenError, SpecError, StepError, ToolchainError
     from phigen.geometry.system import System
     from phigen.runtime.solver import Solver
     from phigen.runtime.trajectory import Trajectory
@@ -26,6 +26,7 @@ _HOMES = {
     "Trajectory": "phigen.runtime.trajectory",
     "CheckError": "phigen.errors",
     "LimitError": "phigen.errors",
+    "ParameterError": "phigen.errors",
     "PhigenError": "phigen.errors",
     "SpecError": "phigen.errors",
     "StepError": "phigen.errors",
@@ -35,6 +36,7 @@ _HOMES = {
 __all__ = [
     "CheckError",
     "LimitError",
+    "ParameterError",
     "PhigenError",
     "Solver",
     "SpecError",

@@ -116,3 +116,7 @@ class StepError(PhigenError):
     ) -> None:
         super().__init__(message)
         self.step, self.status, self.trajectory, self.members = step, status, trajectory, members
+
+
+class ParameterError(StepError, ValueError):
+    """Parameters with which no step can be made: what is computed from them alone is not finite."""

@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: a85efc333de33d195bc977c65cef423f95470f41760c73f467fe2a0f274b2b8c
+ * body-sha256: b5b7e16e5cda88fbdd908452dcd9b81b8efcef29cc4622b8b5a26f5e4f9c95c7
  */
 #include "ablowitz_ladik3.h"
 
@@ -611,16 +611,25 @@ static ablowitz_ladik3_status ablowitz_ladik3_stages(ablowitz_ladik3_solver *s)
     return ablowitz_ladik3_OK;
 }
 
+/* All of ablowitz_ladik3_init but the gauge. The arguments may be parts of *s: they are read before it is written. */
+static ablowitz_ladik3_status ablowitz_ladik3_start(ablowitz_ladik3_solver *s, const ablowitz_ladik3_params *params, const double x0[6])
+{
+    if (s == NULL || x0 == NULL) return ablowitz_ladik3_BAD_ARGUMENT;
+    const ablowitz_ladik3_params own = params != NULL ? *params : ablowitz_ladik3_default_params;
+    double x[6];
+    memcpy(x, x0, sizeof x);
+    for (int i = 0; i < 6; ++i)
+        if (!isfinite(x[i])) return ablowitz_ladik3_BAD_ARGUMENT;
+    memset(s, 0, sizeof *s);
+    memcpy(s->x, x, sizeof s->x);
+    s->params = own;
+    return ablowitz_ladik3_OK;
+}
+
 ablowitz_ladik3_status ablowitz_ladik3_init(ablowitz_ladik3_solver *s, const ablowitz_ladik3_params *params,
                                             const double x0[6])
 {
-    if (s == NULL || x0 == NULL) return ablowitz_ladik3_BAD_ARGUMENT;
-    for (int i = 0; i < 6; ++i)
-        if (!isfinite(x0[i])) return ablowitz_ladik3_BAD_ARGUMENT;
-    memset(s, 0, sizeof *s);
-    memcpy(s->x, x0, sizeof s->x);
-    s->params = params != NULL ? *params : ablowitz_ladik3_default_params;
-    return ablowitz_ladik3_OK;
+    return ablowitz_ladik3_start(s, params, x0);
 }
 
 /* What depends on the step size; nothing where that is as before. */
@@ -648,23 +657,22 @@ ablowitz_ladik3_status ablowitz_ladik3_step(ablowitz_ladik3_solver *s, double h)
 
 ablowitz_ladik3_status ablowitz_ladik3_integrate(ablowitz_ladik3_solver *s, double h, size_t steps)
 {
-    for (size_t k = 0; k < steps; ++k) {
-        const ablowitz_ladik3_status status = ablowitz_ladik3_step(s, h);
-        if (status != ablowitz_ladik3_OK) return status;
-    }
-    return ablowitz_ladik3_OK;
+    ablowitz_ladik3_status status = ablowitz_ladik3_set_step(s, h);
+    for (size_t k = 0; k < steps && status == ablowitz_ladik3_OK; ++k) status = ablowitz_ladik3_step(s, h);
+    return status;
 }
 
 ablowitz_ladik3_status ablowitz_ladik3_ensemble(const ablowitz_ladik3_params *params, double *x,
                                                 size_t members, double h, size_t steps, unsigned char *status)
 {
-    ablowitz_ladik3_status worst = ablowitz_ladik3_OK;
+    ablowitz_ladik3_status worst = isfinite(h) ? ablowitz_ladik3_OK : ablowitz_ladik3_BAD_ARGUMENT;
+    const ablowitz_ladik3_params own = params != NULL ? *params : ablowitz_ladik3_default_params;
     if (x == NULL && members > 0) return ablowitz_ladik3_BAD_ARGUMENT;
     for (size_t m = 0; m < members; ++m) {
         ablowitz_ladik3_solver s;
         double x0[6];
         for (size_t i = 0; i < 6; ++i) x0[i] = x[i * members + m];
-        ablowitz_ladik3_status member = ablowitz_ladik3_init(&s, params, x0);
+        ablowitz_ladik3_status member = ablowitz_ladik3_init(&s, &own, x0);
         if (member == ablowitz_ladik3_OK) {
             member = ablowitz_ladik3_integrate(&s, h, steps);
             for (size_t i = 0; i < 6; ++i) x[i * members + m] = s.x[i];
@@ -691,7 +699,8 @@ static void ablowitz_ladik3_energy(const ablowitz_ladik3_params *params, const d
 }
 
 /* the Casimirs */
-void ablowitz_ladik3_casimirs(const ablowitz_ladik3_params *params, const double x[6], double out[])
+static void ablowitz_ladik3_casimir_values(const ablowitz_ladik3_params *params, const double x[6],
+                                           double out[restrict 1])
 {
     (void)params;
     (void)x;
@@ -699,7 +708,8 @@ void ablowitz_ladik3_casimirs(const ablowitz_ladik3_params *params, const double
 }
 
 /* pi(x) grad H(x) */
-void ablowitz_ladik3_vector_field(const ablowitz_ladik3_params *params, const double x[6], double out[6])
+static void ablowitz_ladik3_field(const ablowitz_ladik3_params *params, const double x[6],
+                                  double out[restrict 6])
 {
     (void)params;
     const double x1 = x[0];
@@ -735,6 +745,20 @@ double ablowitz_ladik3_hamiltonian(const ablowitz_ladik3_params *params, const d
     return energy[0];
 }
 
+void ablowitz_ladik3_casimirs(const ablowitz_ladik3_params *params, const double x[6], double out[])
+{
+    double value[1]; /* out may overlap x */
+    ablowitz_ladik3_casimir_values(params != NULL ? params : &ablowitz_ladik3_default_params, x, value);
+    for (int i = 0; i < 0; ++i) out[i] = value[i];
+}
+
+void ablowitz_ladik3_vector_field(const ablowitz_ladik3_params *params, const double x[6], double out[6])
+{
+    double value[6];
+    ablowitz_ladik3_field(params != NULL ? params : &ablowitz_ladik3_default_params, x, value);
+    memcpy(out, value, sizeof value);
+}
+
 const char *ablowitz_ladik3_status_string(ablowitz_ladik3_status status)
 {
     switch (status) {
@@ -742,7 +766,7 @@ const char *ablowitz_ladik3_status_string(ablowitz_ladik3_status status)
     case ablowitz_ladik3_NO_CONVERGENCE: return "no convergence: the step is too large";
     case ablowitz_ladik3_SINGULAR: return "singular Newton matrix: the step is too large";
     case ablowitz_ladik3_NOT_FINITE: return "not finite: overflow, or outside the domain";
-    case ablowitz_ladik3_BAD_ARGUMENT: return "bad argument: a null pointer, or a value that is not finite";
+    case ablowitz_ladik3_BAD_ARGUMENT: return "bad argument: a null pointer, or values that are not allowed";
     }
     return "unknown status";
 }

@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 86cd22de7b5d91600de2b33bc66103016abb6e9e920e4d84409cf9710998e19d
+ * body-sha256: 19f7be029a028ab6dcd2bbc8b3a7e45f714b3715b577197800a6bb2045ba31f2
  */
 #ifndef ABLOWITZ_LADIK3_H
 #define ABLOWITZ_LADIK3_H
@@ -43,7 +43,7 @@ typedef enum {
     ablowitz_ladik3_NO_CONVERGENCE, /* the inner solve did not converge: the step is too large */
     ablowitz_ladik3_SINGULAR,       /* the Newton matrix is singular: the step is too large */
     ablowitz_ladik3_NOT_FINITE,     /* infinity or NaN: overflow, or outside the domain */
-    ablowitz_ladik3_BAD_ARGUMENT    /* a null pointer, or a value that is not finite */
+    ablowitz_ladik3_BAD_ARGUMENT    /* a null pointer, a value that is not finite, or parameters that are not allowed */
 } ablowitz_ladik3_status;
 
 /* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
@@ -73,7 +73,9 @@ typedef struct {
     ablowitz_ladik3_memory memory[5];
 } ablowitz_ladik3_solver;
 
-/* Start at x0. params may be NULL for the defaults. */
+/* Start at x0. params may be NULL for the defaults. Arguments of all functions may be parts of the solver, or overlap.
+   ablowitz_ladik3_BAD_ARGUMENT, and *s as before, if x0 or a parameter is not finite, one that has to be positive is not, or
+   what is computed from parameters alone is not finite. */
 ablowitz_ladik3_status ablowitz_ladik3_init(ablowitz_ladik3_solver *s, const ablowitz_ladik3_params *params,
                                             const double x0[6]);
 

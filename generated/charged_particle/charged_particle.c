@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 3e697c42854203ab50e33d048fc549371428a9589d0cba6c5c25a79edf36e57d
+ * body-sha256: 27b182361eb48818737c325ac12567d81791d5a091199014e9352c1fcbc2fa47
  */
 #include "charged_particle.h"
 
@@ -605,16 +605,25 @@ static charged_particle_status charged_particle_stages(charged_particle_solver *
     return charged_particle_OK;
 }
 
+/* All of charged_particle_init but the gauge. The arguments may be parts of *s: they are read before it is written. */
+static charged_particle_status charged_particle_start(charged_particle_solver *s, const charged_particle_params *params, const double x0[6])
+{
+    if (s == NULL || x0 == NULL) return charged_particle_BAD_ARGUMENT;
+    const charged_particle_params own = params != NULL ? *params : charged_particle_default_params;
+    double x[6];
+    memcpy(x, x0, sizeof x);
+    for (int i = 0; i < 6; ++i)
+        if (!isfinite(x[i])) return charged_particle_BAD_ARGUMENT;
+    memset(s, 0, sizeof *s);
+    memcpy(s->x, x, sizeof s->x);
+    s->params = own;
+    return charged_particle_OK;
+}
+
 charged_particle_status charged_particle_init(charged_particle_solver *s,
                                               const charged_particle_params *params, const double x0[6])
 {
-    if (s == NULL || x0 == NULL) return charged_particle_BAD_ARGUMENT;
-    for (int i = 0; i < 6; ++i)
-        if (!isfinite(x0[i])) return charged_particle_BAD_ARGUMENT;
-    memset(s, 0, sizeof *s);
-    memcpy(s->x, x0, sizeof s->x);
-    s->params = params != NULL ? *params : charged_particle_default_params;
-    return charged_particle_OK;
+    return charged_particle_start(s, params, x0);
 }
 
 /* What depends on the step size; nothing where that is as before. */
@@ -642,24 +651,23 @@ charged_particle_status charged_particle_step(charged_particle_solver *s, double
 
 charged_particle_status charged_particle_integrate(charged_particle_solver *s, double h, size_t steps)
 {
-    for (size_t k = 0; k < steps; ++k) {
-        const charged_particle_status status = charged_particle_step(s, h);
-        if (status != charged_particle_OK) return status;
-    }
-    return charged_particle_OK;
+    charged_particle_status status = charged_particle_set_step(s, h);
+    for (size_t k = 0; k < steps && status == charged_particle_OK; ++k) status = charged_particle_step(s, h);
+    return status;
 }
 
 charged_particle_status charged_particle_ensemble(const charged_particle_params *params, double *x,
                                                   size_t members, double h, size_t steps,
                                                   unsigned char *status)
 {
-    charged_particle_status worst = charged_particle_OK;
+    charged_particle_status worst = isfinite(h) ? charged_particle_OK : charged_particle_BAD_ARGUMENT;
+    const charged_particle_params own = params != NULL ? *params : charged_particle_default_params;
     if (x == NULL && members > 0) return charged_particle_BAD_ARGUMENT;
     for (size_t m = 0; m < members; ++m) {
         charged_particle_solver s;
         double x0[6];
         for (size_t i = 0; i < 6; ++i) x0[i] = x[i * members + m];
-        charged_particle_status member = charged_particle_init(&s, params, x0);
+        charged_particle_status member = charged_particle_init(&s, &own, x0);
         if (member == charged_particle_OK) {
             member = charged_particle_integrate(&s, h, steps);
             for (size_t i = 0; i < 6; ++i) x[i * members + m] = s.x[i];
@@ -685,7 +693,8 @@ static void charged_particle_energy(const charged_particle_params *params, const
 }
 
 /* the Casimirs */
-void charged_particle_casimirs(const charged_particle_params *params, const double x[6], double out[])
+static void charged_particle_casimir_values(const charged_particle_params *params, const double x[6],
+                                            double out[restrict 1])
 {
     (void)params;
     (void)x;
@@ -693,7 +702,8 @@ void charged_particle_casimirs(const charged_particle_params *params, const doub
 }
 
 /* pi(x) grad H(x) */
-void charged_particle_vector_field(const charged_particle_params *params, const double x[6], double out[6])
+static void charged_particle_field(const charged_particle_params *params, const double x[6],
+                                   double out[restrict 6])
 {
     (void)params;
     const double x_ = x[0];
@@ -718,6 +728,20 @@ double charged_particle_hamiltonian(const charged_particle_params *params, const
     return energy[0];
 }
 
+void charged_particle_casimirs(const charged_particle_params *params, const double x[6], double out[])
+{
+    double value[1]; /* out may overlap x */
+    charged_particle_casimir_values(params != NULL ? params : &charged_particle_default_params, x, value);
+    for (int i = 0; i < 0; ++i) out[i] = value[i];
+}
+
+void charged_particle_vector_field(const charged_particle_params *params, const double x[6], double out[6])
+{
+    double value[6];
+    charged_particle_field(params != NULL ? params : &charged_particle_default_params, x, value);
+    memcpy(out, value, sizeof value);
+}
+
 const char *charged_particle_status_string(charged_particle_status status)
 {
     switch (status) {
@@ -725,7 +749,7 @@ const char *charged_particle_status_string(charged_particle_status status)
     case charged_particle_NO_CONVERGENCE: return "no convergence: the step is too large";
     case charged_particle_SINGULAR: return "singular Newton matrix: the step is too large";
     case charged_particle_NOT_FINITE: return "not finite: overflow, or outside the domain";
-    case charged_particle_BAD_ARGUMENT: return "bad argument: a null pointer, or a value that is not finite";
+    case charged_particle_BAD_ARGUMENT: return "bad argument: a null pointer, or values that are not allowed";
     }
     return "unknown status";
 }

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: be5afcd07288540d67eac638212c0f9ba12e2a27fbe0cd085154fcfb1ba151c6
+ * body-sha256: cb4ec5d87e233ad059629a02a6541d0e8d9ef178fe3302af685f9bd39bf72d4b
  */
 #ifndef CHARGED_PARTICLE_H
 #define CHARGED_PARTICLE_H
@@ -42,7 +42,7 @@ typedef enum {
     charged_particle_NO_CONVERGENCE, /* the inner solve did not converge: the step is too large */
     charged_particle_SINGULAR,       /* the Newton matrix is singular: the step is too large */
     charged_particle_NOT_FINITE,     /* infinity or NaN: overflow, or outside the domain */
-    charged_particle_BAD_ARGUMENT    /* a null pointer, or a value that is not finite */
+    charged_particle_BAD_ARGUMENT    /* a null pointer, a value that is not finite, or parameters that are not allowed */
 } charged_particle_status;
 
 /* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
@@ -72,7 +72,9 @@ typedef struct {
     charged_particle_memory memory[1];
 } charged_particle_solver;
 
-/* Start at x0. params may be NULL for the defaults. */
+/* Start at x0. params may be NULL for the defaults. Arguments of all functions may be parts of the solver, or overlap.
+   charged_particle_BAD_ARGUMENT, and *s as before, if x0 or a parameter is not finite, one that has to be positive is not, or
+   what is computed from parameters alone is not finite. */
 charged_particle_status charged_particle_init(charged_particle_solver *s,
                                               const charged_particle_params *params, const double x0[6]);
 

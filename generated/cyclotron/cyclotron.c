@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: d8ad9eed84ec50b5c9d47d91c0bc5a5f11ae1abd1f8d4dab1984d28fe266a6ff
+ * body-sha256: 0fc64e607d2503f7e6626eb736a329c859d7b40ea09c02dd03d00f38eba0669a
  */
 #include "cyclotron.h"
 
@@ -435,15 +435,24 @@ static cyclotron_status cyclotron_stages(cyclotron_solver *s)
     return cyclotron_OK;
 }
 
-cyclotron_status cyclotron_init(cyclotron_solver *s, const cyclotron_params *params, const double x0[3])
+/* All of cyclotron_init but the gauge. The arguments may be parts of *s: they are read before it is written. */
+static cyclotron_status cyclotron_start(cyclotron_solver *s, const cyclotron_params *params, const double x0[3])
 {
     if (s == NULL || x0 == NULL) return cyclotron_BAD_ARGUMENT;
+    const cyclotron_params own = params != NULL ? *params : cyclotron_default_params;
+    double x[3];
+    memcpy(x, x0, sizeof x);
     for (int i = 0; i < 3; ++i)
-        if (!isfinite(x0[i])) return cyclotron_BAD_ARGUMENT;
+        if (!isfinite(x[i])) return cyclotron_BAD_ARGUMENT;
     memset(s, 0, sizeof *s);
-    memcpy(s->x, x0, sizeof s->x);
-    s->params = params != NULL ? *params : cyclotron_default_params;
+    memcpy(s->x, x, sizeof s->x);
+    s->params = own;
     return cyclotron_OK;
+}
+
+cyclotron_status cyclotron_init(cyclotron_solver *s, const cyclotron_params *params, const double x0[3])
+{
+    return cyclotron_start(s, params, x0);
 }
 
 /* What depends on the step size; nothing where that is as before. */
@@ -1276,14 +1285,15 @@ static cyclotron_status cyclotron_group_run(const cyclotron_params *params, doub
 cyclotron_status cyclotron_ensemble(const cyclotron_params *params, double *x, size_t members, double h,
                                     size_t steps, unsigned char *status)
 {
-    cyclotron_status worst = cyclotron_OK;
+    cyclotron_status worst = isfinite(h) ? cyclotron_OK : cyclotron_BAD_ARGUMENT;
+    const cyclotron_params own = params != NULL ? *params : cyclotron_default_params;
     size_t earliest = members;
     if (x == NULL && members > 0) return cyclotron_BAD_ARGUMENT;
 #ifdef _OPENMP
 #pragma omp parallel for schedule(dynamic)
 #endif
     for (size_t first = 0; first < members; first += cyclotron_LANES) {
-        const cyclotron_status group = cyclotron_group_run(params, x, members, first, h, steps, status);
+        const cyclotron_status group = cyclotron_group_run(&own, x, members, first, h, steps, status);
         if (group == cyclotron_OK) continue;
 #ifdef _OPENMP
 #pragma omp critical
@@ -1310,7 +1320,7 @@ static void cyclotron_energy(const cyclotron_params *params, const double x[3], 
 }
 
 /* the Casimirs */
-void cyclotron_casimirs(const cyclotron_params *params, const double x[3], double out[])
+static void cyclotron_casimir_values(const cyclotron_params *params, const double x[3], double out[restrict 1])
 {
     (void)params;
     const double b = x[2];
@@ -1318,7 +1328,7 @@ void cyclotron_casimirs(const cyclotron_params *params, const double x[3], doubl
 }
 
 /* pi(x) grad H(x) */
-void cyclotron_vector_field(const cyclotron_params *params, const double x[3], double out[3])
+static void cyclotron_field(const cyclotron_params *params, const double x[3], double out[restrict 3])
 {
     (void)params;
     const double u = x[0];
@@ -1336,6 +1346,20 @@ double cyclotron_hamiltonian(const cyclotron_params *params, const double x[3])
     return energy[0];
 }
 
+void cyclotron_casimirs(const cyclotron_params *params, const double x[3], double out[])
+{
+    double value[1]; /* out may overlap x */
+    cyclotron_casimir_values(params != NULL ? params : &cyclotron_default_params, x, value);
+    for (int i = 0; i < 1; ++i) out[i] = value[i];
+}
+
+void cyclotron_vector_field(const cyclotron_params *params, const double x[3], double out[3])
+{
+    double value[3];
+    cyclotron_field(params != NULL ? params : &cyclotron_default_params, x, value);
+    memcpy(out, value, sizeof value);
+}
+
 const char *cyclotron_status_string(cyclotron_status status)
 {
     switch (status) {
@@ -1343,7 +1367,7 @@ const char *cyclotron_status_string(cyclotron_status status)
     case cyclotron_NO_CONVERGENCE: return "no convergence: the step is too large";
     case cyclotron_SINGULAR: return "singular Newton matrix: the step is too large";
     case cyclotron_NOT_FINITE: return "not finite: overflow, or outside the domain";
-    case cyclotron_BAD_ARGUMENT: return "bad argument: a null pointer, or a value that is not finite";
+    case cyclotron_BAD_ARGUMENT: return "bad argument: a null pointer, or values that are not allowed";
     }
     return "unknown status";
 }

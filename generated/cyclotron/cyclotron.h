@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 786eed7f89b1a20c36699be0baf31dad5b823ca58c681d578a3e7d4f445eb50b
+ * body-sha256: 65c632ac31f2f6fe6a97a116ee6e1cec9b36f80fa8ad7f1786b4f1012f13c8c8
  */
 #ifndef CYCLOTRON_H
 #define CYCLOTRON_H
@@ -42,7 +42,7 @@ typedef enum {
     cyclotron_NO_CONVERGENCE, /* the inner solve did not converge: the step is too large */
     cyclotron_SINGULAR,       /* the Newton matrix is singular: the step is too large */
     cyclotron_NOT_FINITE,     /* infinity or NaN: overflow, or outside the domain */
-    cyclotron_BAD_ARGUMENT    /* a null pointer, or a value that is not finite */
+    cyclotron_BAD_ARGUMENT    /* a null pointer, a value that is not finite, or parameters that are not allowed */
 } cyclotron_status;
 
 /* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
@@ -79,7 +79,9 @@ typedef struct {
     cyclotron_memory memory[1];
 } cyclotron_solver;
 
-/* Start at x0. params may be NULL for the defaults. */
+/* Start at x0. params may be NULL for the defaults. Arguments of all functions may be parts of the solver, or overlap.
+   cyclotron_BAD_ARGUMENT, and *s as before, if x0 or a parameter is not finite, one that has to be positive is not, or
+   what is computed from parameters alone is not finite. */
 cyclotron_status cyclotron_init(cyclotron_solver *s, const cyclotron_params *params, const double x0[3]);
 
 /* One step of size h, of either sign. On failure the state is as before. */

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: b87dfadb9a1798a9b1399a83308e8eab79884c0ce6fd449e3d4772ea15bbe162
+ * body-sha256: 0f50722cba372bc06e94c2f1163a934e0189564ea97003a818d408849a94d170
  */
 #include "engel_geodesics.h"
 
@@ -472,16 +472,25 @@ static engel_geodesics_status engel_geodesics_stages(engel_geodesics_solver *s)
     return engel_geodesics_OK;
 }
 
+/* All of engel_geodesics_init but the gauge. The arguments may be parts of *s: they are read before it is written. */
+static engel_geodesics_status engel_geodesics_start(engel_geodesics_solver *s, const engel_geodesics_params *params, const double x0[4])
+{
+    if (s == NULL || x0 == NULL) return engel_geodesics_BAD_ARGUMENT;
+    const engel_geodesics_params own = params != NULL ? *params : engel_geodesics_default_params;
+    double x[4];
+    memcpy(x, x0, sizeof x);
+    for (int i = 0; i < 4; ++i)
+        if (!isfinite(x[i])) return engel_geodesics_BAD_ARGUMENT;
+    memset(s, 0, sizeof *s);
+    memcpy(s->x, x, sizeof s->x);
+    s->params = own;
+    return engel_geodesics_OK;
+}
+
 engel_geodesics_status engel_geodesics_init(engel_geodesics_solver *s, const engel_geodesics_params *params,
                                             const double x0[4])
 {
-    if (s == NULL || x0 == NULL) return engel_geodesics_BAD_ARGUMENT;
-    for (int i = 0; i < 4; ++i)
-        if (!isfinite(x0[i])) return engel_geodesics_BAD_ARGUMENT;
-    memset(s, 0, sizeof *s);
-    memcpy(s->x, x0, sizeof s->x);
-    s->params = params != NULL ? *params : engel_geodesics_default_params;
-    return engel_geodesics_OK;
+    return engel_geodesics_start(s, params, x0);
 }
 
 /* What depends on the step size; nothing where that is as before. */
@@ -1385,14 +1394,15 @@ static engel_geodesics_status engel_geodesics_group_run(const engel_geodesics_pa
 engel_geodesics_status engel_geodesics_ensemble(const engel_geodesics_params *params, double *x,
                                                 size_t members, double h, size_t steps, unsigned char *status)
 {
-    engel_geodesics_status worst = engel_geodesics_OK;
+    engel_geodesics_status worst = isfinite(h) ? engel_geodesics_OK : engel_geodesics_BAD_ARGUMENT;
+    const engel_geodesics_params own = params != NULL ? *params : engel_geodesics_default_params;
     size_t earliest = members;
     if (x == NULL && members > 0) return engel_geodesics_BAD_ARGUMENT;
 #ifdef _OPENMP
 #pragma omp parallel for schedule(dynamic)
 #endif
     for (size_t first = 0; first < members; first += engel_geodesics_LANES) {
-        const engel_geodesics_status group = engel_geodesics_group_run(params, x, members, first, h, steps, status);
+        const engel_geodesics_status group = engel_geodesics_group_run(&own, x, members, first, h, steps, status);
         if (group == engel_geodesics_OK) continue;
 #ifdef _OPENMP
 #pragma omp critical
@@ -1420,7 +1430,8 @@ static void engel_geodesics_energy(const engel_geodesics_params *params, const d
 }
 
 /* the Casimirs */
-void engel_geodesics_casimirs(const engel_geodesics_params *params, const double x[4], double out[])
+static void engel_geodesics_casimir_values(const engel_geodesics_params *params, const double x[4],
+                                           double out[restrict 2])
 {
     (void)params;
     const double h2 = x[1];
@@ -1431,7 +1442,8 @@ void engel_geodesics_casimirs(const engel_geodesics_params *params, const double
 }
 
 /* pi(x) grad H(x) */
-void engel_geodesics_vector_field(const engel_geodesics_params *params, const double x[4], double out[4])
+static void engel_geodesics_field(const engel_geodesics_params *params, const double x[4],
+                                  double out[restrict 4])
 {
     (void)params;
     const double h1 = x[0];
@@ -1451,6 +1463,20 @@ double engel_geodesics_hamiltonian(const engel_geodesics_params *params, const d
     return energy[0];
 }
 
+void engel_geodesics_casimirs(const engel_geodesics_params *params, const double x[4], double out[])
+{
+    double value[2]; /* out may overlap x */
+    engel_geodesics_casimir_values(params != NULL ? params : &engel_geodesics_default_params, x, value);
+    for (int i = 0; i < 2; ++i) out[i] = value[i];
+}
+
+void engel_geodesics_vector_field(const engel_geodesics_params *params, const double x[4], double out[4])
+{
+    double value[4];
+    engel_geodesics_field(params != NULL ? params : &engel_geodesics_default_params, x, value);
+    memcpy(out, value, sizeof value);
+}
+
 const char *engel_geodesics_status_string(engel_geodesics_status status)
 {
     switch (status) {
@@ -1458,7 +1484,7 @@ const char *engel_geodesics_status_string(engel_geodesics_status status)
     case engel_geodesics_NO_CONVERGENCE: return "no convergence: the step is too large";
     case engel_geodesics_SINGULAR: return "singular Newton matrix: the step is too large";
     case engel_geodesics_NOT_FINITE: return "not finite: overflow, or outside the domain";
-    case engel_geodesics_BAD_ARGUMENT: return "bad argument: a null pointer, or a value that is not finite";
+    case engel_geodesics_BAD_ARGUMENT: return "bad argument: a null pointer, or values that are not allowed";
     }
     return "unknown status";
 }

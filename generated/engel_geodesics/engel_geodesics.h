@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 26383a9c4db0446d85c449cb4ab0e15b9d92c175bd65737a9d7c7f396e276af1
+ * body-sha256: c985378225a8dfdbdf54d7060df9917c965e6a10f198140e041348490703003d
  */
 #ifndef ENGEL_GEODESICS_H
 #define ENGEL_GEODESICS_H
@@ -42,7 +42,7 @@ typedef enum {
     engel_geodesics_NO_CONVERGENCE, /* the inner solve did not converge: the step is too large */
     engel_geodesics_SINGULAR,       /* the Newton matrix is singular: the step is too large */
     engel_geodesics_NOT_FINITE,     /* infinity or NaN: overflow, or outside the domain */
-    engel_geodesics_BAD_ARGUMENT    /* a null pointer, or a value that is not finite */
+    engel_geodesics_BAD_ARGUMENT    /* a null pointer, a value that is not finite, or parameters that are not allowed */
 } engel_geodesics_status;
 
 /* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
@@ -79,7 +79,9 @@ typedef struct {
     engel_geodesics_memory memory[1];
 } engel_geodesics_solver;
 
-/* Start at x0. params may be NULL for the defaults. */
+/* Start at x0. params may be NULL for the defaults. Arguments of all functions may be parts of the solver, or overlap.
+   engel_geodesics_BAD_ARGUMENT, and *s as before, if x0 or a parameter is not finite, one that has to be positive is not, or
+   what is computed from parameters alone is not finite. */
 engel_geodesics_status engel_geodesics_init(engel_geodesics_solver *s, const engel_geodesics_params *params,
                                             const double x0[4]);
 

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: b4020a0ba4de4145735448dbd7fc17ae49db38db2c0d2a347df8365817978729
+ * body-sha256: 2e69d1db801c00cdf42b7fc8b5e83997ffcfde592c99f2d609fe9b6dc90e1521
  */
 #include "gaussian_moments.h"
 
@@ -586,16 +586,39 @@ static gaussian_moments_status gaussian_moments_stages(gaussian_moments_solver *
     return gaussian_moments_OK;
 }
 
+/* Whether steps can be made with these parameters: finite, positive where the spec says so, and with finite
+   coefficients for a step so short that it has no part in it. */
+static int gaussian_moments_admissible(const gaussian_moments_params *params)
+{
+    double coef[14];
+    if (!(isfinite(params->k))) return 0;
+    if (!(isfinite(params->g))) return 0;
+    gaussian_moments_prepare(params, 1e-100, coef);
+    for (int k = 0; k < 14; ++k)
+        if (!isfinite(coef[k])) return 0;
+    return 1;
+}
+
+/* All of gaussian_moments_init but the gauge. The arguments may be parts of *s: they are read before it is written. */
+static gaussian_moments_status gaussian_moments_start(gaussian_moments_solver *s, const gaussian_moments_params *params, const double x0[3])
+{
+    if (s == NULL || x0 == NULL) return gaussian_moments_BAD_ARGUMENT;
+    const gaussian_moments_params own = params != NULL ? *params : gaussian_moments_default_params;
+    double x[3];
+    memcpy(x, x0, sizeof x);
+    for (int i = 0; i < 3; ++i)
+        if (!isfinite(x[i])) return gaussian_moments_BAD_ARGUMENT;
+    if (!gaussian_moments_admissible(&own)) return gaussian_moments_BAD_ARGUMENT;
+    memset(s, 0, sizeof *s);
+    memcpy(s->x, x, sizeof s->x);
+    s->params = own;
+    return gaussian_moments_OK;
+}
+
 gaussian_moments_status gaussian_moments_init(gaussian_moments_solver *s,
                                               const gaussian_moments_params *params, const double x0[3])
 {
-    if (s == NULL || x0 == NULL) return gaussian_moments_BAD_ARGUMENT;
-    for (int i = 0; i < 3; ++i)
-        if (!isfinite(x0[i])) return gaussian_moments_BAD_ARGUMENT;
-    memset(s, 0, sizeof *s);
-    memcpy(s->x, x0, sizeof s->x);
-    s->params = params != NULL ? *params : gaussian_moments_default_params;
-    return gaussian_moments_OK;
+    return gaussian_moments_start(s, params, x0);
 }
 
 /* What depends on the step size; nothing where that is as before. */
@@ -1521,14 +1544,15 @@ gaussian_moments_status gaussian_moments_ensemble(const gaussian_moments_params 
                                                   size_t members, double h, size_t steps,
                                                   unsigned char *status)
 {
-    gaussian_moments_status worst = gaussian_moments_OK;
+    gaussian_moments_status worst = isfinite(h) ? gaussian_moments_OK : gaussian_moments_BAD_ARGUMENT;
+    const gaussian_moments_params own = params != NULL ? *params : gaussian_moments_default_params;
     size_t earliest = members;
     if (x == NULL && members > 0) return gaussian_moments_BAD_ARGUMENT;
 #ifdef _OPENMP
 #pragma omp parallel for schedule(dynamic)
 #endif
     for (size_t first = 0; first < members; first += gaussian_moments_LANES) {
-        const gaussian_moments_status group = gaussian_moments_group_run(params, x, members, first, h, steps, status);
+        const gaussian_moments_status group = gaussian_moments_group_run(&own, x, members, first, h, steps, status);
         if (group == gaussian_moments_OK) continue;
 #ifdef _OPENMP
 #pragma omp critical
@@ -1555,7 +1579,8 @@ static void gaussian_moments_energy(const gaussian_moments_params *params, const
 }
 
 /* the Casimirs */
-void gaussian_moments_casimirs(const gaussian_moments_params *params, const double x[3], double out[])
+static void gaussian_moments_casimir_values(const gaussian_moments_params *params, const double x[3],
+                                            double out[restrict 1])
 {
     (void)params;
     const double a = x[0];
@@ -1565,9 +1590,9 @@ void gaussian_moments_casimirs(const gaussian_moments_params *params, const doub
 }
 
 /* pi(x) grad H(x) */
-void gaussian_moments_vector_field(const gaussian_moments_params *params, const double x[3], double out[3])
+static void gaussian_moments_field(const gaussian_moments_params *params, const double x[3],
+                                   double out[restrict 3])
 {
-    if (params == NULL) params = &gaussian_moments_default_params;
     const double a = x[0];
     const double b = x[1];
     const double c = x[2];
@@ -1584,6 +1609,20 @@ double gaussian_moments_hamiltonian(const gaussian_moments_params *params, const
     return energy[0];
 }
 
+void gaussian_moments_casimirs(const gaussian_moments_params *params, const double x[3], double out[])
+{
+    double value[1]; /* out may overlap x */
+    gaussian_moments_casimir_values(params != NULL ? params : &gaussian_moments_default_params, x, value);
+    for (int i = 0; i < 1; ++i) out[i] = value[i];
+}
+
+void gaussian_moments_vector_field(const gaussian_moments_params *params, const double x[3], double out[3])
+{
+    double value[3];
+    gaussian_moments_field(params != NULL ? params : &gaussian_moments_default_params, x, value);
+    memcpy(out, value, sizeof value);
+}
+
 const char *gaussian_moments_status_string(gaussian_moments_status status)
 {
     switch (status) {
@@ -1591,7 +1630,7 @@ const char *gaussian_moments_status_string(gaussian_moments_status status)
     case gaussian_moments_NO_CONVERGENCE: return "no convergence: the step is too large";
     case gaussian_moments_SINGULAR: return "singular Newton matrix: the step is too large";
     case gaussian_moments_NOT_FINITE: return "not finite: overflow, or outside the domain";
-    case gaussian_moments_BAD_ARGUMENT: return "bad argument: a null pointer, or a value that is not finite";
+    case gaussian_moments_BAD_ARGUMENT: return "bad argument: a null pointer, or values that are not allowed";
     }
     return "unknown status";
 }

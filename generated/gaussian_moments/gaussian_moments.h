@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 7bbe4e26faaa05c1340e56b58727444c5cbcfd3e7ddd36e0e555bc0aefa811ba
+ * body-sha256: 606a722f0bff8b80d388850966ef12adf06c5c8f46d327275c96e0fbf183c38e
  */
 #ifndef GAUSSIAN_MOMENTS_H
 #define GAUSSIAN_MOMENTS_H
@@ -43,7 +43,7 @@ typedef enum {
     gaussian_moments_NO_CONVERGENCE, /* the inner solve did not converge: the step is too large */
     gaussian_moments_SINGULAR,       /* the Newton matrix is singular: the step is too large */
     gaussian_moments_NOT_FINITE,     /* infinity or NaN: overflow, or outside the domain */
-    gaussian_moments_BAD_ARGUMENT    /* a null pointer, or a value that is not finite */
+    gaussian_moments_BAD_ARGUMENT    /* a null pointer, a value that is not finite, or parameters that are not allowed */
 } gaussian_moments_status;
 
 /* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
@@ -80,7 +80,9 @@ typedef struct {
     gaussian_moments_memory memory[1];
 } gaussian_moments_solver;
 
-/* Start at x0. params may be NULL for the defaults. */
+/* Start at x0. params may be NULL for the defaults. Arguments of all functions may be parts of the solver, or overlap.
+   gaussian_moments_BAD_ARGUMENT, and *s as before, if x0 or a parameter is not finite, one that has to be positive is not, or
+   what is computed from parameters alone is not finite. */
 gaussian_moments_status gaussian_moments_init(gaussian_moments_solver *s,
                                               const gaussian_moments_params *params, const double x0[3]);
 

@@ -12,7 +12,7 @@
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: de31572c94fd4b68e195989fb8066fd3e31eb219da3aa102a15386d941fd01cc
+# body-sha256: 7019dfc28b71c6b8e2d1c74264ae5f522ca65e9ce9427c44dc5229123f9cf0ef
 import numpy as np
 
 VERSION = "0.1.0"
@@ -25,6 +25,9 @@ DEFAULT_PARAMETERS = {
     "k": 1.0,
     "g": 0.5,
 }
+
+# Parameters that have to be positive.
+POSITIVE = ()
 
 # Casimirs whose multiples the solver subtracts from the Hamiltonian before discretising: see gauge().
 GAUGE = ()
@@ -43,13 +46,6 @@ class StepError(ArithmeticError):
     def __init__(self, step, status, members, states):
         super().__init__(f"step {step}: {status}, members {members}")
         self.step, self.status, self.members, self.states = step, status, members, states
-
-
-def _values(parameters):
-    unknown = sorted(set(parameters) - set(DEFAULT_PARAMETERS))
-    if unknown:
-        raise TypeError(f"unknown parameters {unknown}; known are {sorted(DEFAULT_PARAMETERS)}")
-    return {**DEFAULT_PARAMETERS, **parameters}
 
 
 def _at(coef, members):
@@ -71,6 +67,26 @@ def _sum(x, carry, change):
     total = x + change
     added = total - x
     return total, (x - (total - added)) + (change - added)
+
+
+def _values(parameters):
+    """All parameters, as numbers of NumPy: dividing by zero, they give infinity."""
+    unknown = sorted(set(parameters) - set(DEFAULT_PARAMETERS))
+    if unknown:
+        raise TypeError(f"unknown parameters {unknown}; known are {sorted(DEFAULT_PARAMETERS)}")
+    return {name: np.asarray(value, dtype=float)[()] for name, value in {**DEFAULT_PARAMETERS, **parameters}.items()}
+
+
+def _admissible(values):
+    """Whether steps can be made with these parameters.
+
+    They have to be finite, positive where the spec says so, and to give finite coefficients for a step so short that
+    it has no part in it.
+    """
+    if not np.isfinite(list(values.values())).all() or not all(values[name] > 0.0 for name in POSITIVE):
+        return False
+    with np.errstate(all="ignore"):
+        return all(np.isfinite(c).all() for c in _prepare(values, 1e-100))
 
 
 def _phi0(s):
@@ -395,8 +411,8 @@ def step(x, h, gauge=None, **parameters):
 def integrate(x0, h, steps, stride=1, gauge=None, **parameters):
     """States at steps 0, stride, 2*stride, ... and at the last step: shape (rows, ..., DIM).
 
-    x0 has shape (..., DIM): leading axes are members, each integrated by itself. Raises StepError as soon as a
-    step of a member fails. gauge (one value for each Casimir in GAUGE) overrides the choice of the solver: the step
+    x0 has shape (..., DIM): leading axes are members, each integrated by itself. Raises ValueError for arguments that
+    are not allowed, and StepError as soon as a step of a member fails. gauge (one value for each Casimir in GAUGE) overrides the choice of the solver: the step
     is an exact Poisson map for each fixed gauge.
     """
     x = np.array(x0, dtype=float)
@@ -406,13 +422,16 @@ def integrate(x0, h, steps, stride=1, gauge=None, **parameters):
         raise ValueError("steps must be at least 0 and stride at least 1")
     if not (np.isfinite(x).all() and np.isfinite(h)):
         raise ValueError("x0 and h must be finite")
+    values = _values(parameters)
+    if not _admissible(values):
+        raise ValueError(f"no step can be made with the parameters { {**DEFAULT_PARAMETERS, **parameters} }")
     shape = x.shape
     x = x.reshape(-1, DIM)
     carry = np.zeros_like(x)
     memory = [(carry, carry)] * len(FRACTIONS)
     rows = [x]
     with np.errstate(all="ignore"):
-        stages = _coefficients(_values(parameters), x, float(h), gauge)
+        stages = _coefficients(values, x, float(h), gauge)
         for done in range(steps):
             following = x
             for k, stage in enumerate(stages):
@@ -461,14 +480,17 @@ def _vector_field(parameters, x):
 
 def hamiltonian(x, **parameters):
     """The Hamiltonian at x: (..., DIM) -> (...)."""
-    return _energy(_values(parameters), np.asarray(x, dtype=float))[..., 0]
+    with np.errstate(all="ignore"):
+        return _energy(_values(parameters), np.asarray(x, dtype=float))[..., 0]
 
 
 def casimirs(x, **parameters):
     """The Casimirs at x, in the order of CASIMIRS: (..., DIM) -> (..., number of Casimirs)."""
-    return _casimirs(_values(parameters), np.asarray(x, dtype=float))
+    with np.errstate(all="ignore"):
+        return _casimirs(_values(parameters), np.asarray(x, dtype=float))
 
 
 def vector_field(x, **parameters):
     """The right-hand side pi(x) grad H(x): (..., DIM) -> (..., DIM)."""
-    return _vector_field(_values(parameters), np.asarray(x, dtype=float))
+    with np.errstate(all="ignore"):
+        return _vector_field(_values(parameters), np.asarray(x, dtype=float))

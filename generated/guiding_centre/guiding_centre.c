@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 2a409da711cd3fdca109b4181722e3289226e82d982fee5ae5d46f8a4aa182ec
+ * body-sha256: c7134e10cb05dc3d1ecd0e387df401f0ad0473f44f24674e172a1434ab9d7787
  */
 #include "guiding_centre.h"
 
@@ -721,16 +721,40 @@ static guiding_centre_status guiding_centre_stages(guiding_centre_solver *s)
     return guiding_centre_OK;
 }
 
+/* Whether steps can be made with these parameters: finite, positive where the spec says so, and with finite
+   coefficients for a step so short that it has no part in it. */
+static int guiding_centre_admissible(const guiding_centre_params *params)
+{
+    double coef[5];
+    if (!(isfinite(params->kappa))) return 0;
+    if (!(isfinite(params->mu) && params->mu > 0.0)) return 0;
+    if (!(isfinite(params->k) && params->k > 0.0)) return 0;
+    guiding_centre_prepare(params, 1e-100, coef);
+    for (int k = 0; k < 5; ++k)
+        if (!isfinite(coef[k])) return 0;
+    return 1;
+}
+
+/* All of guiding_centre_init but the gauge. The arguments may be parts of *s: they are read before it is written. */
+static guiding_centre_status guiding_centre_start(guiding_centre_solver *s, const guiding_centre_params *params, const double x0[4])
+{
+    if (s == NULL || x0 == NULL) return guiding_centre_BAD_ARGUMENT;
+    const guiding_centre_params own = params != NULL ? *params : guiding_centre_default_params;
+    double x[4];
+    memcpy(x, x0, sizeof x);
+    for (int i = 0; i < 4; ++i)
+        if (!isfinite(x[i])) return guiding_centre_BAD_ARGUMENT;
+    if (!guiding_centre_admissible(&own)) return guiding_centre_BAD_ARGUMENT;
+    memset(s, 0, sizeof *s);
+    memcpy(s->x, x, sizeof s->x);
+    s->params = own;
+    return guiding_centre_OK;
+}
+
 guiding_centre_status guiding_centre_init(guiding_centre_solver *s, const guiding_centre_params *params,
                                           const double x0[4])
 {
-    if (s == NULL || x0 == NULL) return guiding_centre_BAD_ARGUMENT;
-    for (int i = 0; i < 4; ++i)
-        if (!isfinite(x0[i])) return guiding_centre_BAD_ARGUMENT;
-    memset(s, 0, sizeof *s);
-    memcpy(s->x, x0, sizeof s->x);
-    s->params = params != NULL ? *params : guiding_centre_default_params;
-    return guiding_centre_OK;
+    return guiding_centre_start(s, params, x0);
 }
 
 /* What depends on the step size; nothing where that is as before. */
@@ -2704,13 +2728,14 @@ guiding_centre_status guiding_centre_integrate(guiding_centre_solver *s, double 
 guiding_centre_status guiding_centre_ensemble(const guiding_centre_params *params, double *x, size_t members,
                                               double h, size_t steps, unsigned char *status)
 {
-    guiding_centre_status worst = guiding_centre_OK;
+    guiding_centre_status worst = isfinite(h) ? guiding_centre_OK : guiding_centre_BAD_ARGUMENT;
+    const guiding_centre_params own = params != NULL ? *params : guiding_centre_default_params;
     if (x == NULL && members > 0) return guiding_centre_BAD_ARGUMENT;
     for (size_t m = 0; m < members; ++m) {
         guiding_centre_solver s;
         double x0[4];
         for (size_t i = 0; i < 4; ++i) x0[i] = x[i * members + m];
-        guiding_centre_status member = guiding_centre_init(&s, params, x0);
+        guiding_centre_status member = guiding_centre_init(&s, &own, x0);
         if (member == guiding_centre_OK) {
             member = guiding_centre_integrate(&s, h, steps);
             for (size_t i = 0; i < 4; ++i) x[i * members + m] = s.x[i];
@@ -2738,7 +2763,8 @@ static void guiding_centre_energy(const guiding_centre_params *params, const dou
 }
 
 /* the Casimirs */
-void guiding_centre_casimirs(const guiding_centre_params *params, const double x[4], double out[])
+static void guiding_centre_casimir_values(const guiding_centre_params *params, const double x[4],
+                                          double out[restrict 1])
 {
     (void)params;
     (void)x;
@@ -2746,9 +2772,9 @@ void guiding_centre_casimirs(const guiding_centre_params *params, const double x
 }
 
 /* pi(x) grad H(x) */
-void guiding_centre_vector_field(const guiding_centre_params *params, const double x[4], double out[4])
+static void guiding_centre_field(const guiding_centre_params *params, const double x[4],
+                                 double out[restrict 4])
 {
-    if (params == NULL) params = &guiding_centre_default_params;
     const double x_ = x[0];
     const double y = x[1];
     const double z = x[2];
@@ -2787,6 +2813,20 @@ double guiding_centre_hamiltonian(const guiding_centre_params *params, const dou
     return energy[0];
 }
 
+void guiding_centre_casimirs(const guiding_centre_params *params, const double x[4], double out[])
+{
+    double value[1]; /* out may overlap x */
+    guiding_centre_casimir_values(params != NULL ? params : &guiding_centre_default_params, x, value);
+    for (int i = 0; i < 0; ++i) out[i] = value[i];
+}
+
+void guiding_centre_vector_field(const guiding_centre_params *params, const double x[4], double out[4])
+{
+    double value[4];
+    guiding_centre_field(params != NULL ? params : &guiding_centre_default_params, x, value);
+    memcpy(out, value, sizeof value);
+}
+
 const char *guiding_centre_status_string(guiding_centre_status status)
 {
     switch (status) {
@@ -2794,7 +2834,7 @@ const char *guiding_centre_status_string(guiding_centre_status status)
     case guiding_centre_NO_CONVERGENCE: return "no convergence: the step is too large";
     case guiding_centre_SINGULAR: return "singular Newton matrix: the step is too large";
     case guiding_centre_NOT_FINITE: return "not finite: overflow, or outside the domain";
-    case guiding_centre_BAD_ARGUMENT: return "bad argument: a null pointer, or a value that is not finite";
+    case guiding_centre_BAD_ARGUMENT: return "bad argument: a null pointer, or values that are not allowed";
     }
     return "unknown status";
 }

@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 4f20c75e9fb9810be84bc4622b5bda9907c8ebc39170dd2b85f5c283f4d8967a
+ * body-sha256: 358f932f4d61760bdaa3ded5d17fd2eb51395ea4d2eff2d2f1c6e3d793a7c601
  */
 #ifndef GUIDING_CENTRE_H
 #define GUIDING_CENTRE_H
@@ -45,7 +45,7 @@ typedef enum {
     guiding_centre_NO_CONVERGENCE, /* the inner solve did not converge: the step is too large */
     guiding_centre_SINGULAR,       /* the Newton matrix is singular: the step is too large */
     guiding_centre_NOT_FINITE,     /* infinity or NaN: overflow, or outside the domain */
-    guiding_centre_BAD_ARGUMENT    /* a null pointer, or a value that is not finite */
+    guiding_centre_BAD_ARGUMENT    /* a null pointer, a value that is not finite, or parameters that are not allowed */
 } guiding_centre_status;
 
 /* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
@@ -82,7 +82,9 @@ typedef struct {
     guiding_centre_memory memory[5];
 } guiding_centre_solver;
 
-/* Start at x0. params may be NULL for the defaults. */
+/* Start at x0. params may be NULL for the defaults. Arguments of all functions may be parts of the solver, or overlap.
+   guiding_centre_BAD_ARGUMENT, and *s as before, if x0 or a parameter is not finite, one that has to be positive is not, or
+   what is computed from parameters alone is not finite. */
 guiding_centre_status guiding_centre_init(guiding_centre_solver *s, const guiding_centre_params *params,
                                           const double x0[4]);
 

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 63bc5f366f82fa123b4f0a13a79300d52e9f6bb08b975d8f6c2ada590ef3fa0d
+ * body-sha256: f1f21172ce2c7f73a47517c7f7a19955e6b894378faa6ace1af182ee42351184
  */
 #include "harmonic_oscillator.h"
 
@@ -417,17 +417,40 @@ static harmonic_oscillator_status harmonic_oscillator_stages(harmonic_oscillator
     return harmonic_oscillator_OK;
 }
 
+/* Whether steps can be made with these parameters: finite, positive where the spec says so, and with finite
+   coefficients for a step so short that it has no part in it. */
+static int harmonic_oscillator_admissible(const harmonic_oscillator_params *params)
+{
+    double coef[5];
+    if (!(isfinite(params->m) && params->m > 0.0)) return 0;
+    if (!(isfinite(params->k) && params->k > 0.0)) return 0;
+    harmonic_oscillator_prepare(params, 1e-100, coef);
+    for (int k = 0; k < 5; ++k)
+        if (!isfinite(coef[k])) return 0;
+    return 1;
+}
+
+/* All of harmonic_oscillator_init but the gauge. The arguments may be parts of *s: they are read before it is written. */
+static harmonic_oscillator_status harmonic_oscillator_start(harmonic_oscillator_solver *s, const harmonic_oscillator_params *params, const double x0[2])
+{
+    if (s == NULL || x0 == NULL) return harmonic_oscillator_BAD_ARGUMENT;
+    const harmonic_oscillator_params own = params != NULL ? *params : harmonic_oscillator_default_params;
+    double x[2];
+    memcpy(x, x0, sizeof x);
+    for (int i = 0; i < 2; ++i)
+        if (!isfinite(x[i])) return harmonic_oscillator_BAD_ARGUMENT;
+    if (!harmonic_oscillator_admissible(&own)) return harmonic_oscillator_BAD_ARGUMENT;
+    memset(s, 0, sizeof *s);
+    memcpy(s->x, x, sizeof s->x);
+    s->params = own;
+    return harmonic_oscillator_OK;
+}
+
 harmonic_oscillator_status harmonic_oscillator_init(harmonic_oscillator_solver *s,
                                                     const harmonic_oscillator_params *params,
                                                     const double x0[2])
 {
-    if (s == NULL || x0 == NULL) return harmonic_oscillator_BAD_ARGUMENT;
-    for (int i = 0; i < 2; ++i)
-        if (!isfinite(x0[i])) return harmonic_oscillator_BAD_ARGUMENT;
-    memset(s, 0, sizeof *s);
-    memcpy(s->x, x0, sizeof s->x);
-    s->params = params != NULL ? *params : harmonic_oscillator_default_params;
-    return harmonic_oscillator_OK;
+    return harmonic_oscillator_start(s, params, x0);
 }
 
 /* What depends on the step size; nothing where that is as before. */
@@ -1218,14 +1241,15 @@ harmonic_oscillator_status harmonic_oscillator_ensemble(const harmonic_oscillato
                                                         size_t members, double h, size_t steps,
                                                         unsigned char *status)
 {
-    harmonic_oscillator_status worst = harmonic_oscillator_OK;
+    harmonic_oscillator_status worst = isfinite(h) ? harmonic_oscillator_OK : harmonic_oscillator_BAD_ARGUMENT;
+    const harmonic_oscillator_params own = params != NULL ? *params : harmonic_oscillator_default_params;
     size_t earliest = members;
     if (x == NULL && members > 0) return harmonic_oscillator_BAD_ARGUMENT;
 #ifdef _OPENMP
 #pragma omp parallel for schedule(dynamic)
 #endif
     for (size_t first = 0; first < members; first += harmonic_oscillator_LANES) {
-        const harmonic_oscillator_status group = harmonic_oscillator_group_run(params, x, members, first, h, steps, status);
+        const harmonic_oscillator_status group = harmonic_oscillator_group_run(&own, x, members, first, h, steps, status);
         if (group == harmonic_oscillator_OK) continue;
 #ifdef _OPENMP
 #pragma omp critical
@@ -1252,7 +1276,8 @@ static void harmonic_oscillator_energy(const harmonic_oscillator_params *params,
 }
 
 /* the Casimirs */
-void harmonic_oscillator_casimirs(const harmonic_oscillator_params *params, const double x[2], double out[])
+static void harmonic_oscillator_casimir_values(const harmonic_oscillator_params *params, const double x[2],
+                                               double out[restrict 1])
 {
     (void)params;
     (void)x;
@@ -1260,10 +1285,9 @@ void harmonic_oscillator_casimirs(const harmonic_oscillator_params *params, cons
 }
 
 /* pi(x) grad H(x) */
-void harmonic_oscillator_vector_field(const harmonic_oscillator_params *params, const double x[2],
-                                      double out[2])
+static void harmonic_oscillator_field(const harmonic_oscillator_params *params, const double x[2],
+                                      double out[restrict 2])
 {
-    if (params == NULL) params = &harmonic_oscillator_default_params;
     const double q = x[0];
     const double p = x[1];
     out[0] = p / params->m;
@@ -1277,6 +1301,21 @@ double harmonic_oscillator_hamiltonian(const harmonic_oscillator_params *params,
     return energy[0];
 }
 
+void harmonic_oscillator_casimirs(const harmonic_oscillator_params *params, const double x[2], double out[])
+{
+    double value[1]; /* out may overlap x */
+    harmonic_oscillator_casimir_values(params != NULL ? params : &harmonic_oscillator_default_params, x, value);
+    for (int i = 0; i < 0; ++i) out[i] = value[i];
+}
+
+void harmonic_oscillator_vector_field(const harmonic_oscillator_params *params, const double x[2],
+                                      double out[2])
+{
+    double value[2];
+    harmonic_oscillator_field(params != NULL ? params : &harmonic_oscillator_default_params, x, value);
+    memcpy(out, value, sizeof value);
+}
+
 const char *harmonic_oscillator_status_string(harmonic_oscillator_status status)
 {
     switch (status) {
@@ -1284,7 +1323,7 @@ const char *harmonic_oscillator_status_string(harmonic_oscillator_status status)
     case harmonic_oscillator_NO_CONVERGENCE: return "no convergence: the step is too large";
     case harmonic_oscillator_SINGULAR: return "singular Newton matrix: the step is too large";
     case harmonic_oscillator_NOT_FINITE: return "not finite: overflow, or outside the domain";
-    case harmonic_oscillator_BAD_ARGUMENT: return "bad argument: a null pointer, or a value that is not finite";
+    case harmonic_oscillator_BAD_ARGUMENT: return "bad argument: a null pointer, or values that are not allowed";
     }
     return "unknown status";
 }

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 2a7396d8993433b78bb09179d2ab067d4c0117d79db0fedf7b626eb030f5ed5c
+ * body-sha256: 5fe782b3a8d6404d1c8d6e32c32d92bdae64d0868f8cd4439475d0e9ef33bc6d
  */
 #ifndef HARMONIC_OSCILLATOR_H
 #define HARMONIC_OSCILLATOR_H
@@ -43,7 +43,7 @@ typedef enum {
     harmonic_oscillator_NO_CONVERGENCE, /* the inner solve did not converge: the step is too large */
     harmonic_oscillator_SINGULAR,       /* the Newton matrix is singular: the step is too large */
     harmonic_oscillator_NOT_FINITE,     /* infinity or NaN: overflow, or outside the domain */
-    harmonic_oscillator_BAD_ARGUMENT    /* a null pointer, or a value that is not finite */
+    harmonic_oscillator_BAD_ARGUMENT    /* a null pointer, a value that is not finite, or parameters that are not allowed */
 } harmonic_oscillator_status;
 
 /* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
@@ -80,7 +80,9 @@ typedef struct {
     harmonic_oscillator_memory memory[1];
 } harmonic_oscillator_solver;
 
-/* Start at x0. params may be NULL for the defaults. */
+/* Start at x0. params may be NULL for the defaults. Arguments of all functions may be parts of the solver, or overlap.
+   harmonic_oscillator_BAD_ARGUMENT, and *s as before, if x0 or a parameter is not finite, one that has to be positive is not, or
+   what is computed from parameters alone is not finite. */
 harmonic_oscillator_status harmonic_oscillator_init(harmonic_oscillator_solver *s,
                                                     const harmonic_oscillator_params *params,
                                                     const double x0[2]);
@@ -105,7 +107,8 @@ double harmonic_oscillator_hamiltonian(const harmonic_oscillator_params *params,
 void harmonic_oscillator_casimirs(const harmonic_oscillator_params *params, const double x[2], double out[]);
 
 /* The right-hand side pi(x) grad H(x). */
-void harmonic_oscillator_vector_field(const harmonic_oscillator_params *params, const double x[2], double out[2]);
+void harmonic_oscillator_vector_field(const harmonic_oscillator_params *params, const double x[2],
+                                      double out[2]);
 
 const char *harmonic_oscillator_status_string(harmonic_oscillator_status status);
 

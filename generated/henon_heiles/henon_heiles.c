@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: c2341d10b31671c37e64a9d738655ed6f0cbcc68b1ec9a22a928c03ebaefcef1
+ * body-sha256: 8e4f1e818b2e9b1822f219d05f3040a2e431cea97d8c60f2f4fdbf4d12186606
  */
 #include "henon_heiles.h"
 
@@ -521,16 +521,25 @@ static henon_heiles_status henon_heiles_stages(henon_heiles_solver *s)
     return henon_heiles_OK;
 }
 
+/* All of henon_heiles_init but the gauge. The arguments may be parts of *s: they are read before it is written. */
+static henon_heiles_status henon_heiles_start(henon_heiles_solver *s, const henon_heiles_params *params, const double x0[4])
+{
+    if (s == NULL || x0 == NULL) return henon_heiles_BAD_ARGUMENT;
+    const henon_heiles_params own = params != NULL ? *params : henon_heiles_default_params;
+    double x[4];
+    memcpy(x, x0, sizeof x);
+    for (int i = 0; i < 4; ++i)
+        if (!isfinite(x[i])) return henon_heiles_BAD_ARGUMENT;
+    memset(s, 0, sizeof *s);
+    memcpy(s->x, x, sizeof s->x);
+    s->params = own;
+    return henon_heiles_OK;
+}
+
 henon_heiles_status henon_heiles_init(henon_heiles_solver *s, const henon_heiles_params *params,
                                       const double x0[4])
 {
-    if (s == NULL || x0 == NULL) return henon_heiles_BAD_ARGUMENT;
-    for (int i = 0; i < 4; ++i)
-        if (!isfinite(x0[i])) return henon_heiles_BAD_ARGUMENT;
-    memset(s, 0, sizeof *s);
-    memcpy(s->x, x0, sizeof s->x);
-    s->params = params != NULL ? *params : henon_heiles_default_params;
-    return henon_heiles_OK;
+    return henon_heiles_start(s, params, x0);
 }
 
 /* What depends on the step size; nothing where that is as before. */
@@ -1449,14 +1458,15 @@ static henon_heiles_status henon_heiles_group_run(const henon_heiles_params *par
 henon_heiles_status henon_heiles_ensemble(const henon_heiles_params *params, double *x, size_t members,
                                           double h, size_t steps, unsigned char *status)
 {
-    henon_heiles_status worst = henon_heiles_OK;
+    henon_heiles_status worst = isfinite(h) ? henon_heiles_OK : henon_heiles_BAD_ARGUMENT;
+    const henon_heiles_params own = params != NULL ? *params : henon_heiles_default_params;
     size_t earliest = members;
     if (x == NULL && members > 0) return henon_heiles_BAD_ARGUMENT;
 #ifdef _OPENMP
 #pragma omp parallel for schedule(dynamic)
 #endif
     for (size_t first = 0; first < members; first += henon_heiles_LANES) {
-        const henon_heiles_status group = henon_heiles_group_run(params, x, members, first, h, steps, status);
+        const henon_heiles_status group = henon_heiles_group_run(&own, x, members, first, h, steps, status);
         if (group == henon_heiles_OK) continue;
 #ifdef _OPENMP
 #pragma omp critical
@@ -1488,7 +1498,8 @@ static void henon_heiles_energy(const henon_heiles_params *params, const double 
 }
 
 /* the Casimirs */
-void henon_heiles_casimirs(const henon_heiles_params *params, const double x[4], double out[])
+static void henon_heiles_casimir_values(const henon_heiles_params *params, const double x[4],
+                                        double out[restrict 1])
 {
     (void)params;
     (void)x;
@@ -1496,7 +1507,7 @@ void henon_heiles_casimirs(const henon_heiles_params *params, const double x[4],
 }
 
 /* pi(x) grad H(x) */
-void henon_heiles_vector_field(const henon_heiles_params *params, const double x[4], double out[4])
+static void henon_heiles_field(const henon_heiles_params *params, const double x[4], double out[restrict 4])
 {
     (void)params;
     const double x_ = x[0];
@@ -1516,6 +1527,20 @@ double henon_heiles_hamiltonian(const henon_heiles_params *params, const double 
     return energy[0];
 }
 
+void henon_heiles_casimirs(const henon_heiles_params *params, const double x[4], double out[])
+{
+    double value[1]; /* out may overlap x */
+    henon_heiles_casimir_values(params != NULL ? params : &henon_heiles_default_params, x, value);
+    for (int i = 0; i < 0; ++i) out[i] = value[i];
+}
+
+void henon_heiles_vector_field(const henon_heiles_params *params, const double x[4], double out[4])
+{
+    double value[4];
+    henon_heiles_field(params != NULL ? params : &henon_heiles_default_params, x, value);
+    memcpy(out, value, sizeof value);
+}
+
 const char *henon_heiles_status_string(henon_heiles_status status)
 {
     switch (status) {
@@ -1523,7 +1548,7 @@ const char *henon_heiles_status_string(henon_heiles_status status)
     case henon_heiles_NO_CONVERGENCE: return "no convergence: the step is too large";
     case henon_heiles_SINGULAR: return "singular Newton matrix: the step is too large";
     case henon_heiles_NOT_FINITE: return "not finite: overflow, or outside the domain";
-    case henon_heiles_BAD_ARGUMENT: return "bad argument: a null pointer, or a value that is not finite";
+    case henon_heiles_BAD_ARGUMENT: return "bad argument: a null pointer, or values that are not allowed";
     }
     return "unknown status";
 }

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 99c8dc360ac613615309d202fcae7a77e785c4f097c26394603d9458de5a4005
+ * body-sha256: b88430a8b459c32468b450bf4e57e4b5a1017ef2510d3ec2a0f5dba68178cd47
  */
 #ifndef HENON_HEILES_H
 #define HENON_HEILES_H
@@ -42,7 +42,7 @@ typedef enum {
     henon_heiles_NO_CONVERGENCE, /* the inner solve did not converge: the step is too large */
     henon_heiles_SINGULAR,       /* the Newton matrix is singular: the step is too large */
     henon_heiles_NOT_FINITE,     /* infinity or NaN: overflow, or outside the domain */
-    henon_heiles_BAD_ARGUMENT    /* a null pointer, or a value that is not finite */
+    henon_heiles_BAD_ARGUMENT    /* a null pointer, a value that is not finite, or parameters that are not allowed */
 } henon_heiles_status;
 
 /* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
@@ -79,7 +79,9 @@ typedef struct {
     henon_heiles_memory memory[1];
 } henon_heiles_solver;
 
-/* Start at x0. params may be NULL for the defaults. */
+/* Start at x0. params may be NULL for the defaults. Arguments of all functions may be parts of the solver, or overlap.
+   henon_heiles_BAD_ARGUMENT, and *s as before, if x0 or a parameter is not finite, one that has to be positive is not, or
+   what is computed from parameters alone is not finite. */
 henon_heiles_status henon_heiles_init(henon_heiles_solver *s, const henon_heiles_params *params,
                                       const double x0[4]);
 

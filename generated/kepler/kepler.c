@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: af53a6d901fd992fe725fb2e65016d912e5513d8e898393e98ddcf94758229b8
+ * body-sha256: 6eef6fa9ebda155e17614be2059b1681638a60c59a30a4bf4b9c907c88cd13f4
  */
 #include "kepler.h"
 
@@ -832,15 +832,37 @@ static kepler_status kepler_stages(kepler_solver *s)
     return kepler_OK;
 }
 
-kepler_status kepler_init(kepler_solver *s, const kepler_params *params, const double x0[4])
+/* Whether steps can be made with these parameters: finite, positive where the spec says so, and with finite
+   coefficients for a step so short that it has no part in it. */
+static int kepler_admissible(const kepler_params *params)
+{
+    double coef[118];
+    if (!(isfinite(params->mu) && params->mu > 0.0)) return 0;
+    kepler_prepare(params, 1e-100, coef);
+    for (int k = 0; k < 118; ++k)
+        if (!isfinite(coef[k])) return 0;
+    return 1;
+}
+
+/* All of kepler_init but the gauge. The arguments may be parts of *s: they are read before it is written. */
+static kepler_status kepler_start(kepler_solver *s, const kepler_params *params, const double x0[4])
 {
     if (s == NULL || x0 == NULL) return kepler_BAD_ARGUMENT;
+    const kepler_params own = params != NULL ? *params : kepler_default_params;
+    double x[4];
+    memcpy(x, x0, sizeof x);
     for (int i = 0; i < 4; ++i)
-        if (!isfinite(x0[i])) return kepler_BAD_ARGUMENT;
+        if (!isfinite(x[i])) return kepler_BAD_ARGUMENT;
+    if (!kepler_admissible(&own)) return kepler_BAD_ARGUMENT;
     memset(s, 0, sizeof *s);
-    memcpy(s->x, x0, sizeof s->x);
-    s->params = params != NULL ? *params : kepler_default_params;
+    memcpy(s->x, x, sizeof s->x);
+    s->params = own;
     return kepler_OK;
+}
+
+kepler_status kepler_init(kepler_solver *s, const kepler_params *params, const double x0[4])
+{
+    return kepler_start(s, params, x0);
 }
 
 /* What depends on the step size; nothing where that is as before. */
@@ -1971,14 +1993,15 @@ static kepler_status kepler_group_run(const kepler_params *params, double *x, si
 kepler_status kepler_ensemble(const kepler_params *params, double *x, size_t members, double h, size_t steps,
                               unsigned char *status)
 {
-    kepler_status worst = kepler_OK;
+    kepler_status worst = isfinite(h) ? kepler_OK : kepler_BAD_ARGUMENT;
+    const kepler_params own = params != NULL ? *params : kepler_default_params;
     size_t earliest = members;
     if (x == NULL && members > 0) return kepler_BAD_ARGUMENT;
 #ifdef _OPENMP
 #pragma omp parallel for schedule(dynamic)
 #endif
     for (size_t first = 0; first < members; first += kepler_LANES) {
-        const kepler_status group = kepler_group_run(params, x, members, first, h, steps, status);
+        const kepler_status group = kepler_group_run(&own, x, members, first, h, steps, status);
         if (group == kepler_OK) continue;
 #ifdef _OPENMP
 #pragma omp critical
@@ -2006,7 +2029,7 @@ static void kepler_energy(const kepler_params *params, const double x[4], double
 }
 
 /* the Casimirs */
-void kepler_casimirs(const kepler_params *params, const double x[4], double out[])
+static void kepler_casimir_values(const kepler_params *params, const double x[4], double out[restrict 1])
 {
     (void)params;
     (void)x;
@@ -2014,9 +2037,8 @@ void kepler_casimirs(const kepler_params *params, const double x[4], double out[
 }
 
 /* pi(x) grad H(x) */
-void kepler_vector_field(const kepler_params *params, const double x[4], double out[4])
+static void kepler_field(const kepler_params *params, const double x[4], double out[restrict 4])
 {
-    if (params == NULL) params = &kepler_default_params;
     const double x_ = x[0];
     const double y = x[1];
     const double px = x[2];
@@ -2036,6 +2058,20 @@ double kepler_hamiltonian(const kepler_params *params, const double x[4])
     return energy[0];
 }
 
+void kepler_casimirs(const kepler_params *params, const double x[4], double out[])
+{
+    double value[1]; /* out may overlap x */
+    kepler_casimir_values(params != NULL ? params : &kepler_default_params, x, value);
+    for (int i = 0; i < 0; ++i) out[i] = value[i];
+}
+
+void kepler_vector_field(const kepler_params *params, const double x[4], double out[4])
+{
+    double value[4];
+    kepler_field(params != NULL ? params : &kepler_default_params, x, value);
+    memcpy(out, value, sizeof value);
+}
+
 const char *kepler_status_string(kepler_status status)
 {
     switch (status) {
@@ -2043,7 +2079,7 @@ const char *kepler_status_string(kepler_status status)
     case kepler_NO_CONVERGENCE: return "no convergence: the step is too large";
     case kepler_SINGULAR: return "singular Newton matrix: the step is too large";
     case kepler_NOT_FINITE: return "not finite: overflow, or outside the domain";
-    case kepler_BAD_ARGUMENT: return "bad argument: a null pointer, or a value that is not finite";
+    case kepler_BAD_ARGUMENT: return "bad argument: a null pointer, or values that are not allowed";
     }
     return "unknown status";
 }

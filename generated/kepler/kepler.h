@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 8232752118d76ce2c59d6039288459d40694b2a94cdd89febd48252b429e0c90
+ * body-sha256: 9b32c618c9b9ebcdefdd4a3f1682caa07b706473aac327c399a97574ecf18cf8
  */
 #ifndef KEPLER_H
 #define KEPLER_H
@@ -42,7 +42,7 @@ typedef enum {
     kepler_NO_CONVERGENCE, /* the inner solve did not converge: the step is too large */
     kepler_SINGULAR,       /* the Newton matrix is singular: the step is too large */
     kepler_NOT_FINITE,     /* infinity or NaN: overflow, or outside the domain */
-    kepler_BAD_ARGUMENT    /* a null pointer, or a value that is not finite */
+    kepler_BAD_ARGUMENT    /* a null pointer, a value that is not finite, or parameters that are not allowed */
 } kepler_status;
 
 /* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
@@ -79,7 +79,9 @@ typedef struct {
     kepler_memory memory[1];
 } kepler_solver;
 
-/* Start at x0. params may be NULL for the defaults. */
+/* Start at x0. params may be NULL for the defaults. Arguments of all functions may be parts of the solver, or overlap.
+   kepler_BAD_ARGUMENT, and *s as before, if x0 or a parameter is not finite, one that has to be positive is not, or
+   what is computed from parameters alone is not finite. */
 kepler_status kepler_init(kepler_solver *s, const kepler_params *params, const double x0[4]);
 
 /* One step of size h, of either sign. On failure the state is as before. */

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: b97c840ea0f2bd7ba993f06062d2ea3bf194d7ba42e4adb207303ad4caf5a1b2
+ * body-sha256: ca7a746631769c79b16c9793f3c98e14d73659f5107c08eb6edf91c44fb1ea38
  */
 #include "kowalevski_top.h"
 
@@ -1345,16 +1345,25 @@ static kowalevski_top_status kowalevski_top_stages(kowalevski_top_solver *s)
     return kowalevski_top_OK;
 }
 
+/* All of kowalevski_top_init but the gauge. The arguments may be parts of *s: they are read before it is written. */
+static kowalevski_top_status kowalevski_top_start(kowalevski_top_solver *s, const kowalevski_top_params *params, const double x0[6])
+{
+    if (s == NULL || x0 == NULL) return kowalevski_top_BAD_ARGUMENT;
+    const kowalevski_top_params own = params != NULL ? *params : kowalevski_top_default_params;
+    double x[6];
+    memcpy(x, x0, sizeof x);
+    for (int i = 0; i < 6; ++i)
+        if (!isfinite(x[i])) return kowalevski_top_BAD_ARGUMENT;
+    memset(s, 0, sizeof *s);
+    memcpy(s->x, x, sizeof s->x);
+    s->params = own;
+    return kowalevski_top_OK;
+}
+
 kowalevski_top_status kowalevski_top_init(kowalevski_top_solver *s, const kowalevski_top_params *params,
                                           const double x0[6])
 {
-    if (s == NULL || x0 == NULL) return kowalevski_top_BAD_ARGUMENT;
-    for (int i = 0; i < 6; ++i)
-        if (!isfinite(x0[i])) return kowalevski_top_BAD_ARGUMENT;
-    memset(s, 0, sizeof *s);
-    memcpy(s->x, x0, sizeof s->x);
-    s->params = params != NULL ? *params : kowalevski_top_default_params;
-    return kowalevski_top_OK;
+    return kowalevski_top_start(s, params, x0);
 }
 
 /* What depends on the step size; nothing where that is as before. */
@@ -2975,14 +2984,15 @@ static kowalevski_top_status kowalevski_top_group_run(const kowalevski_top_param
 kowalevski_top_status kowalevski_top_ensemble(const kowalevski_top_params *params, double *x, size_t members,
                                               double h, size_t steps, unsigned char *status)
 {
-    kowalevski_top_status worst = kowalevski_top_OK;
+    kowalevski_top_status worst = isfinite(h) ? kowalevski_top_OK : kowalevski_top_BAD_ARGUMENT;
+    const kowalevski_top_params own = params != NULL ? *params : kowalevski_top_default_params;
     size_t earliest = members;
     if (x == NULL && members > 0) return kowalevski_top_BAD_ARGUMENT;
 #ifdef _OPENMP
 #pragma omp parallel for schedule(dynamic)
 #endif
     for (size_t first = 0; first < members; first += kowalevski_top_LANES) {
-        const kowalevski_top_status group = kowalevski_top_group_run(params, x, members, first, h, steps, status);
+        const kowalevski_top_status group = kowalevski_top_group_run(&own, x, members, first, h, steps, status);
         if (group == kowalevski_top_OK) continue;
 #ifdef _OPENMP
 #pragma omp critical
@@ -3012,7 +3022,8 @@ static void kowalevski_top_energy(const kowalevski_top_params *params, const dou
 }
 
 /* the Casimirs */
-void kowalevski_top_casimirs(const kowalevski_top_params *params, const double x[6], double out[])
+static void kowalevski_top_casimir_values(const kowalevski_top_params *params, const double x[6],
+                                          double out[restrict 2])
 {
     (void)params;
     const double P1 = x[0];
@@ -3026,7 +3037,8 @@ void kowalevski_top_casimirs(const kowalevski_top_params *params, const double x
 }
 
 /* pi(x) grad H(x) */
-void kowalevski_top_vector_field(const kowalevski_top_params *params, const double x[6], double out[6])
+static void kowalevski_top_field(const kowalevski_top_params *params, const double x[6],
+                                 double out[restrict 6])
 {
     (void)params;
     const double P1 = x[0];
@@ -3052,6 +3064,20 @@ double kowalevski_top_hamiltonian(const kowalevski_top_params *params, const dou
     return energy[0];
 }
 
+void kowalevski_top_casimirs(const kowalevski_top_params *params, const double x[6], double out[])
+{
+    double value[2]; /* out may overlap x */
+    kowalevski_top_casimir_values(params != NULL ? params : &kowalevski_top_default_params, x, value);
+    for (int i = 0; i < 2; ++i) out[i] = value[i];
+}
+
+void kowalevski_top_vector_field(const kowalevski_top_params *params, const double x[6], double out[6])
+{
+    double value[6];
+    kowalevski_top_field(params != NULL ? params : &kowalevski_top_default_params, x, value);
+    memcpy(out, value, sizeof value);
+}
+
 const char *kowalevski_top_status_string(kowalevski_top_status status)
 {
     switch (status) {
@@ -3059,7 +3085,7 @@ const char *kowalevski_top_status_string(kowalevski_top_status status)
     case kowalevski_top_NO_CONVERGENCE: return "no convergence: the step is too large";
     case kowalevski_top_SINGULAR: return "singular Newton matrix: the step is too large";
     case kowalevski_top_NOT_FINITE: return "not finite: overflow, or outside the domain";
-    case kowalevski_top_BAD_ARGUMENT: return "bad argument: a null pointer, or a value that is not finite";
+    case kowalevski_top_BAD_ARGUMENT: return "bad argument: a null pointer, or values that are not allowed";
     }
     return "unknown status";
 }

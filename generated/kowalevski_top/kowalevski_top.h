@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 3bd2c0bbe4c86fad6007c73b4327a44f1c7d7e1faa97cdeabb33dce4100f90f2
+ * body-sha256: f716a5ee94d19827647ee3b37210ab354d59b961221acbe918260d08ff019f52
  */
 #ifndef KOWALEVSKI_TOP_H
 #define KOWALEVSKI_TOP_H
@@ -42,7 +42,7 @@ typedef enum {
     kowalevski_top_NO_CONVERGENCE, /* the inner solve did not converge: the step is too large */
     kowalevski_top_SINGULAR,       /* the Newton matrix is singular: the step is too large */
     kowalevski_top_NOT_FINITE,     /* infinity or NaN: overflow, or outside the domain */
-    kowalevski_top_BAD_ARGUMENT    /* a null pointer, or a value that is not finite */
+    kowalevski_top_BAD_ARGUMENT    /* a null pointer, a value that is not finite, or parameters that are not allowed */
 } kowalevski_top_status;
 
 /* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
@@ -79,7 +79,9 @@ typedef struct {
     kowalevski_top_memory memory[1];
 } kowalevski_top_solver;
 
-/* Start at x0. params may be NULL for the defaults. */
+/* Start at x0. params may be NULL for the defaults. Arguments of all functions may be parts of the solver, or overlap.
+   kowalevski_top_BAD_ARGUMENT, and *s as before, if x0 or a parameter is not finite, one that has to be positive is not, or
+   what is computed from parameters alone is not finite. */
 kowalevski_top_status kowalevski_top_init(kowalevski_top_solver *s, const kowalevski_top_params *params,
                                           const double x0[6]);
 

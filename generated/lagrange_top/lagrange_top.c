@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 0bcb6843be3f1633541f1ee359cc6a84b5dae97658347a5bab3f4378724ddfd5
+ * body-sha256: a1824192eeed4270214ce5ff49f904809d77c4e564da3ee4a17ac2f2d9881174
  */
 #include "lagrange_top.h"
 
@@ -939,16 +939,40 @@ static lagrange_top_status lagrange_top_stages(lagrange_top_solver *s)
     return lagrange_top_OK;
 }
 
+/* Whether steps can be made with these parameters: finite, positive where the spec says so, and with finite
+   coefficients for a step so short that it has no part in it. */
+static int lagrange_top_admissible(const lagrange_top_params *params)
+{
+    double coef[8];
+    if (!(isfinite(params->I1) && params->I1 > 0.0)) return 0;
+    if (!(isfinite(params->I3) && params->I3 > 0.0)) return 0;
+    if (!(isfinite(params->mgl))) return 0;
+    lagrange_top_prepare(params, 1e-100, coef);
+    for (int k = 0; k < 8; ++k)
+        if (!isfinite(coef[k])) return 0;
+    return 1;
+}
+
+/* All of lagrange_top_init but the gauge. The arguments may be parts of *s: they are read before it is written. */
+static lagrange_top_status lagrange_top_start(lagrange_top_solver *s, const lagrange_top_params *params, const double x0[6])
+{
+    if (s == NULL || x0 == NULL) return lagrange_top_BAD_ARGUMENT;
+    const lagrange_top_params own = params != NULL ? *params : lagrange_top_default_params;
+    double x[6];
+    memcpy(x, x0, sizeof x);
+    for (int i = 0; i < 6; ++i)
+        if (!isfinite(x[i])) return lagrange_top_BAD_ARGUMENT;
+    if (!lagrange_top_admissible(&own)) return lagrange_top_BAD_ARGUMENT;
+    memset(s, 0, sizeof *s);
+    memcpy(s->x, x, sizeof s->x);
+    s->params = own;
+    return lagrange_top_OK;
+}
+
 lagrange_top_status lagrange_top_init(lagrange_top_solver *s, const lagrange_top_params *params,
                                       const double x0[6])
 {
-    if (s == NULL || x0 == NULL) return lagrange_top_BAD_ARGUMENT;
-    for (int i = 0; i < 6; ++i)
-        if (!isfinite(x0[i])) return lagrange_top_BAD_ARGUMENT;
-    memset(s, 0, sizeof *s);
-    memcpy(s->x, x0, sizeof s->x);
-    s->params = params != NULL ? *params : lagrange_top_default_params;
-    return lagrange_top_OK;
+    return lagrange_top_start(s, params, x0);
 }
 
 /* What depends on the step size; nothing where that is as before. */
@@ -2250,14 +2274,15 @@ static lagrange_top_status lagrange_top_group_run(const lagrange_top_params *par
 lagrange_top_status lagrange_top_ensemble(const lagrange_top_params *params, double *x, size_t members,
                                           double h, size_t steps, unsigned char *status)
 {
-    lagrange_top_status worst = lagrange_top_OK;
+    lagrange_top_status worst = isfinite(h) ? lagrange_top_OK : lagrange_top_BAD_ARGUMENT;
+    const lagrange_top_params own = params != NULL ? *params : lagrange_top_default_params;
     size_t earliest = members;
     if (x == NULL && members > 0) return lagrange_top_BAD_ARGUMENT;
 #ifdef _OPENMP
 #pragma omp parallel for schedule(dynamic)
 #endif
     for (size_t first = 0; first < members; first += lagrange_top_LANES) {
-        const lagrange_top_status group = lagrange_top_group_run(params, x, members, first, h, steps, status);
+        const lagrange_top_status group = lagrange_top_group_run(&own, x, members, first, h, steps, status);
         if (group == lagrange_top_OK) continue;
 #ifdef _OPENMP
 #pragma omp critical
@@ -2286,7 +2311,8 @@ static void lagrange_top_energy(const lagrange_top_params *params, const double 
 }
 
 /* the Casimirs */
-void lagrange_top_casimirs(const lagrange_top_params *params, const double x[6], double out[])
+static void lagrange_top_casimir_values(const lagrange_top_params *params, const double x[6],
+                                        double out[restrict 2])
 {
     (void)params;
     const double P1 = x[0];
@@ -2300,9 +2326,8 @@ void lagrange_top_casimirs(const lagrange_top_params *params, const double x[6],
 }
 
 /* pi(x) grad H(x) */
-void lagrange_top_vector_field(const lagrange_top_params *params, const double x[6], double out[6])
+static void lagrange_top_field(const lagrange_top_params *params, const double x[6], double out[restrict 6])
 {
-    if (params == NULL) params = &lagrange_top_default_params;
     const double P1 = x[0];
     const double P2 = x[1];
     const double P3 = x[2];
@@ -2328,6 +2353,20 @@ double lagrange_top_hamiltonian(const lagrange_top_params *params, const double 
     return energy[0];
 }
 
+void lagrange_top_casimirs(const lagrange_top_params *params, const double x[6], double out[])
+{
+    double value[2]; /* out may overlap x */
+    lagrange_top_casimir_values(params != NULL ? params : &lagrange_top_default_params, x, value);
+    for (int i = 0; i < 2; ++i) out[i] = value[i];
+}
+
+void lagrange_top_vector_field(const lagrange_top_params *params, const double x[6], double out[6])
+{
+    double value[6];
+    lagrange_top_field(params != NULL ? params : &lagrange_top_default_params, x, value);
+    memcpy(out, value, sizeof value);
+}
+
 const char *lagrange_top_status_string(lagrange_top_status status)
 {
     switch (status) {
@@ -2335,7 +2374,7 @@ const char *lagrange_top_status_string(lagrange_top_status status)
     case lagrange_top_NO_CONVERGENCE: return "no convergence: the step is too large";
     case lagrange_top_SINGULAR: return "singular Newton matrix: the step is too large";
     case lagrange_top_NOT_FINITE: return "not finite: overflow, or outside the domain";
-    case lagrange_top_BAD_ARGUMENT: return "bad argument: a null pointer, or a value that is not finite";
+    case lagrange_top_BAD_ARGUMENT: return "bad argument: a null pointer, or values that are not allowed";
     }
     return "unknown status";
 }

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: ed6f48bd09b61e2b938723773c3e80d69e7dfd7b48964ff5ceab4a70c6cb2053
+ * body-sha256: 56d95a27c713c23354a5cebf8d0cda59eea0ce60f3e35aa33b6516bd34dcea01
  */
 #ifndef LAGRANGE_TOP_H
 #define LAGRANGE_TOP_H
@@ -44,7 +44,7 @@ typedef enum {
     lagrange_top_NO_CONVERGENCE, /* the inner solve did not converge: the step is too large */
     lagrange_top_SINGULAR,       /* the Newton matrix is singular: the step is too large */
     lagrange_top_NOT_FINITE,     /* infinity or NaN: overflow, or outside the domain */
-    lagrange_top_BAD_ARGUMENT    /* a null pointer, or a value that is not finite */
+    lagrange_top_BAD_ARGUMENT    /* a null pointer, a value that is not finite, or parameters that are not allowed */
 } lagrange_top_status;
 
 /* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
@@ -81,7 +81,9 @@ typedef struct {
     lagrange_top_memory memory[1];
 } lagrange_top_solver;
 
-/* Start at x0. params may be NULL for the defaults. */
+/* Start at x0. params may be NULL for the defaults. Arguments of all functions may be parts of the solver, or overlap.
+   lagrange_top_BAD_ARGUMENT, and *s as before, if x0 or a parameter is not finite, one that has to be positive is not, or
+   what is computed from parameters alone is not finite. */
 lagrange_top_status lagrange_top_init(lagrange_top_solver *s, const lagrange_top_params *params,
                                       const double x0[6]);
 

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: ed084fc53c588eaa3f33d949a2620e87e82418570933c4d195823d8ecf178c24
+ * body-sha256: 157618a057acc9c3d50c15282d635938335e9647af0feb079061057ba68d77c3
  */
 #include "lotka_volterra.h"
 
@@ -455,16 +455,25 @@ static lotka_volterra_status lotka_volterra_stages(lotka_volterra_solver *s)
     return lotka_volterra_OK;
 }
 
+/* All of lotka_volterra_init but the gauge. The arguments may be parts of *s: they are read before it is written. */
+static lotka_volterra_status lotka_volterra_start(lotka_volterra_solver *s, const lotka_volterra_params *params, const double x0[3])
+{
+    if (s == NULL || x0 == NULL) return lotka_volterra_BAD_ARGUMENT;
+    const lotka_volterra_params own = params != NULL ? *params : lotka_volterra_default_params;
+    double x[3];
+    memcpy(x, x0, sizeof x);
+    for (int i = 0; i < 3; ++i)
+        if (!isfinite(x[i])) return lotka_volterra_BAD_ARGUMENT;
+    memset(s, 0, sizeof *s);
+    memcpy(s->x, x, sizeof s->x);
+    s->params = own;
+    return lotka_volterra_OK;
+}
+
 lotka_volterra_status lotka_volterra_init(lotka_volterra_solver *s, const lotka_volterra_params *params,
                                           const double x0[3])
 {
-    if (s == NULL || x0 == NULL) return lotka_volterra_BAD_ARGUMENT;
-    for (int i = 0; i < 3; ++i)
-        if (!isfinite(x0[i])) return lotka_volterra_BAD_ARGUMENT;
-    memset(s, 0, sizeof *s);
-    memcpy(s->x, x0, sizeof s->x);
-    s->params = params != NULL ? *params : lotka_volterra_default_params;
-    return lotka_volterra_OK;
+    return lotka_volterra_start(s, params, x0);
 }
 
 /* What depends on the step size; nothing where that is as before. */
@@ -1347,14 +1356,15 @@ static lotka_volterra_status lotka_volterra_group_run(const lotka_volterra_param
 lotka_volterra_status lotka_volterra_ensemble(const lotka_volterra_params *params, double *x, size_t members,
                                               double h, size_t steps, unsigned char *status)
 {
-    lotka_volterra_status worst = lotka_volterra_OK;
+    lotka_volterra_status worst = isfinite(h) ? lotka_volterra_OK : lotka_volterra_BAD_ARGUMENT;
+    const lotka_volterra_params own = params != NULL ? *params : lotka_volterra_default_params;
     size_t earliest = members;
     if (x == NULL && members > 0) return lotka_volterra_BAD_ARGUMENT;
 #ifdef _OPENMP
 #pragma omp parallel for schedule(dynamic)
 #endif
     for (size_t first = 0; first < members; first += lotka_volterra_LANES) {
-        const lotka_volterra_status group = lotka_volterra_group_run(params, x, members, first, h, steps, status);
+        const lotka_volterra_status group = lotka_volterra_group_run(&own, x, members, first, h, steps, status);
         if (group == lotka_volterra_OK) continue;
 #ifdef _OPENMP
 #pragma omp critical
@@ -1383,7 +1393,8 @@ static void lotka_volterra_energy(const lotka_volterra_params *params, const dou
 }
 
 /* the Casimirs */
-void lotka_volterra_casimirs(const lotka_volterra_params *params, const double x[3], double out[])
+static void lotka_volterra_casimir_values(const lotka_volterra_params *params, const double x[3],
+                                          double out[restrict 1])
 {
     (void)params;
     const double x1 = x[0];
@@ -1393,7 +1404,8 @@ void lotka_volterra_casimirs(const lotka_volterra_params *params, const double x
 }
 
 /* pi(x) grad H(x) */
-void lotka_volterra_vector_field(const lotka_volterra_params *params, const double x[3], double out[3])
+static void lotka_volterra_field(const lotka_volterra_params *params, const double x[3],
+                                 double out[restrict 3])
 {
     (void)params;
     const double x1 = x[0];
@@ -1414,6 +1426,20 @@ double lotka_volterra_hamiltonian(const lotka_volterra_params *params, const dou
     return energy[0];
 }
 
+void lotka_volterra_casimirs(const lotka_volterra_params *params, const double x[3], double out[])
+{
+    double value[1]; /* out may overlap x */
+    lotka_volterra_casimir_values(params != NULL ? params : &lotka_volterra_default_params, x, value);
+    for (int i = 0; i < 1; ++i) out[i] = value[i];
+}
+
+void lotka_volterra_vector_field(const lotka_volterra_params *params, const double x[3], double out[3])
+{
+    double value[3];
+    lotka_volterra_field(params != NULL ? params : &lotka_volterra_default_params, x, value);
+    memcpy(out, value, sizeof value);
+}
+
 const char *lotka_volterra_status_string(lotka_volterra_status status)
 {
     switch (status) {
@@ -1421,7 +1447,7 @@ const char *lotka_volterra_status_string(lotka_volterra_status status)
     case lotka_volterra_NO_CONVERGENCE: return "no convergence: the step is too large";
     case lotka_volterra_SINGULAR: return "singular Newton matrix: the step is too large";
     case lotka_volterra_NOT_FINITE: return "not finite: overflow, or outside the domain";
-    case lotka_volterra_BAD_ARGUMENT: return "bad argument: a null pointer, or a value that is not finite";
+    case lotka_volterra_BAD_ARGUMENT: return "bad argument: a null pointer, or values that are not allowed";
     }
     return "unknown status";
 }

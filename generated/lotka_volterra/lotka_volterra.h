@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 0b76ac43749ed739f14ded600d2fc8f84aca3a3e316de67afa837d7a341f2421
+ * body-sha256: 650a4a31e4cf824651e9d1c881942ad93845bc678ca8eb6432e3b95b10d3c9ca
  */
 #ifndef LOTKA_VOLTERRA_H
 #define LOTKA_VOLTERRA_H
@@ -42,7 +42,7 @@ typedef enum {
     lotka_volterra_NO_CONVERGENCE, /* the inner solve did not converge: the step is too large */
     lotka_volterra_SINGULAR,       /* the Newton matrix is singular: the step is too large */
     lotka_volterra_NOT_FINITE,     /* infinity or NaN: overflow, or outside the domain */
-    lotka_volterra_BAD_ARGUMENT    /* a null pointer, or a value that is not finite */
+    lotka_volterra_BAD_ARGUMENT    /* a null pointer, a value that is not finite, or parameters that are not allowed */
 } lotka_volterra_status;
 
 /* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
@@ -79,7 +79,9 @@ typedef struct {
     lotka_volterra_memory memory[1];
 } lotka_volterra_solver;
 
-/* Start at x0. params may be NULL for the defaults. */
+/* Start at x0. params may be NULL for the defaults. Arguments of all functions may be parts of the solver, or overlap.
+   lotka_volterra_BAD_ARGUMENT, and *s as before, if x0 or a parameter is not finite, one that has to be positive is not, or
+   what is computed from parameters alone is not finite. */
 lotka_volterra_status lotka_volterra_init(lotka_volterra_solver *s, const lotka_volterra_params *params,
                                           const double x0[3]);
 

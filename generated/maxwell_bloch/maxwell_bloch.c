@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: fe0cca19018a9ad1f669b58f129e5bf421b7586fbd76efc45244e600b208bbd0
+ * body-sha256: bb5731941406a384201b6d0bb3ed7dd5cbaa8cdbf7fc05f10b65e424ebcf7dce
  */
 #include "maxwell_bloch.h"
 
@@ -444,16 +444,25 @@ static maxwell_bloch_status maxwell_bloch_stages(maxwell_bloch_solver *s)
     return maxwell_bloch_OK;
 }
 
+/* All of maxwell_bloch_init but the gauge. The arguments may be parts of *s: they are read before it is written. */
+static maxwell_bloch_status maxwell_bloch_start(maxwell_bloch_solver *s, const maxwell_bloch_params *params, const double x0[3])
+{
+    if (s == NULL || x0 == NULL) return maxwell_bloch_BAD_ARGUMENT;
+    const maxwell_bloch_params own = params != NULL ? *params : maxwell_bloch_default_params;
+    double x[3];
+    memcpy(x, x0, sizeof x);
+    for (int i = 0; i < 3; ++i)
+        if (!isfinite(x[i])) return maxwell_bloch_BAD_ARGUMENT;
+    memset(s, 0, sizeof *s);
+    memcpy(s->x, x, sizeof s->x);
+    s->params = own;
+    return maxwell_bloch_OK;
+}
+
 maxwell_bloch_status maxwell_bloch_init(maxwell_bloch_solver *s, const maxwell_bloch_params *params,
                                         const double x0[3])
 {
-    if (s == NULL || x0 == NULL) return maxwell_bloch_BAD_ARGUMENT;
-    for (int i = 0; i < 3; ++i)
-        if (!isfinite(x0[i])) return maxwell_bloch_BAD_ARGUMENT;
-    memset(s, 0, sizeof *s);
-    memcpy(s->x, x0, sizeof s->x);
-    s->params = params != NULL ? *params : maxwell_bloch_default_params;
-    return maxwell_bloch_OK;
+    return maxwell_bloch_start(s, params, x0);
 }
 
 /* What depends on the step size; nothing where that is as before. */
@@ -1297,14 +1306,15 @@ static maxwell_bloch_status maxwell_bloch_group_run(const maxwell_bloch_params *
 maxwell_bloch_status maxwell_bloch_ensemble(const maxwell_bloch_params *params, double *x, size_t members,
                                             double h, size_t steps, unsigned char *status)
 {
-    maxwell_bloch_status worst = maxwell_bloch_OK;
+    maxwell_bloch_status worst = isfinite(h) ? maxwell_bloch_OK : maxwell_bloch_BAD_ARGUMENT;
+    const maxwell_bloch_params own = params != NULL ? *params : maxwell_bloch_default_params;
     size_t earliest = members;
     if (x == NULL && members > 0) return maxwell_bloch_BAD_ARGUMENT;
 #ifdef _OPENMP
 #pragma omp parallel for schedule(dynamic)
 #endif
     for (size_t first = 0; first < members; first += maxwell_bloch_LANES) {
-        const maxwell_bloch_status group = maxwell_bloch_group_run(params, x, members, first, h, steps, status);
+        const maxwell_bloch_status group = maxwell_bloch_group_run(&own, x, members, first, h, steps, status);
         if (group == maxwell_bloch_OK) continue;
 #ifdef _OPENMP
 #pragma omp critical
@@ -1332,7 +1342,8 @@ static void maxwell_bloch_energy(const maxwell_bloch_params *params, const doubl
 }
 
 /* the Casimirs */
-void maxwell_bloch_casimirs(const maxwell_bloch_params *params, const double x[3], double out[])
+static void maxwell_bloch_casimir_values(const maxwell_bloch_params *params, const double x[3],
+                                         double out[restrict 1])
 {
     (void)params;
     const double x_ = x[0];
@@ -1341,7 +1352,7 @@ void maxwell_bloch_casimirs(const maxwell_bloch_params *params, const double x[3
 }
 
 /* pi(x) grad H(x) */
-void maxwell_bloch_vector_field(const maxwell_bloch_params *params, const double x[3], double out[3])
+static void maxwell_bloch_field(const maxwell_bloch_params *params, const double x[3], double out[restrict 3])
 {
     (void)params;
     const double x_ = x[0];
@@ -1359,6 +1370,20 @@ double maxwell_bloch_hamiltonian(const maxwell_bloch_params *params, const doubl
     return energy[0];
 }
 
+void maxwell_bloch_casimirs(const maxwell_bloch_params *params, const double x[3], double out[])
+{
+    double value[1]; /* out may overlap x */
+    maxwell_bloch_casimir_values(params != NULL ? params : &maxwell_bloch_default_params, x, value);
+    for (int i = 0; i < 1; ++i) out[i] = value[i];
+}
+
+void maxwell_bloch_vector_field(const maxwell_bloch_params *params, const double x[3], double out[3])
+{
+    double value[3];
+    maxwell_bloch_field(params != NULL ? params : &maxwell_bloch_default_params, x, value);
+    memcpy(out, value, sizeof value);
+}
+
 const char *maxwell_bloch_status_string(maxwell_bloch_status status)
 {
     switch (status) {
@@ -1366,7 +1391,7 @@ const char *maxwell_bloch_status_string(maxwell_bloch_status status)
     case maxwell_bloch_NO_CONVERGENCE: return "no convergence: the step is too large";
     case maxwell_bloch_SINGULAR: return "singular Newton matrix: the step is too large";
     case maxwell_bloch_NOT_FINITE: return "not finite: overflow, or outside the domain";
-    case maxwell_bloch_BAD_ARGUMENT: return "bad argument: a null pointer, or a value that is not finite";
+    case maxwell_bloch_BAD_ARGUMENT: return "bad argument: a null pointer, or values that are not allowed";
     }
     return "unknown status";
 }

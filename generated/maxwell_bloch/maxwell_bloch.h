@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 5b3a2f224d3425fd10f13da28ac130b7f4a3d13210f9edfd4f2db95a5772f0ac
+ * body-sha256: 40fdecf7704713887510124c2186641275a2211b4562c84d69fbed3885075dce
  */
 #ifndef MAXWELL_BLOCH_H
 #define MAXWELL_BLOCH_H
@@ -42,7 +42,7 @@ typedef enum {
     maxwell_bloch_NO_CONVERGENCE, /* the inner solve did not converge: the step is too large */
     maxwell_bloch_SINGULAR,       /* the Newton matrix is singular: the step is too large */
     maxwell_bloch_NOT_FINITE,     /* infinity or NaN: overflow, or outside the domain */
-    maxwell_bloch_BAD_ARGUMENT    /* a null pointer, or a value that is not finite */
+    maxwell_bloch_BAD_ARGUMENT    /* a null pointer, a value that is not finite, or parameters that are not allowed */
 } maxwell_bloch_status;
 
 /* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
@@ -79,7 +79,9 @@ typedef struct {
     maxwell_bloch_memory memory[1];
 } maxwell_bloch_solver;
 
-/* Start at x0. params may be NULL for the defaults. */
+/* Start at x0. params may be NULL for the defaults. Arguments of all functions may be parts of the solver, or overlap.
+   maxwell_bloch_BAD_ARGUMENT, and *s as before, if x0 or a parameter is not finite, one that has to be positive is not, or
+   what is computed from parameters alone is not finite. */
 maxwell_bloch_status maxwell_bloch_init(maxwell_bloch_solver *s, const maxwell_bloch_params *params,
                                         const double x0[3]);
 

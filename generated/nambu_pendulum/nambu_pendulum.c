@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: e634da853f1fabb1c514e72c38ff67ef319201661643f7950777af5b3bc3fafb
+ * body-sha256: 1245b624e4189d408af74612ff30db613d54de3d4cc5de00fbbec5e650d34cdc
  */
 #include "nambu_pendulum.h"
 
@@ -535,16 +535,25 @@ static nambu_pendulum_status nambu_pendulum_stages(nambu_pendulum_solver *s)
     return nambu_pendulum_OK;
 }
 
+/* All of nambu_pendulum_init but the gauge. The arguments may be parts of *s: they are read before it is written. */
+static nambu_pendulum_status nambu_pendulum_start(nambu_pendulum_solver *s, const nambu_pendulum_params *params, const double x0[3])
+{
+    if (s == NULL || x0 == NULL) return nambu_pendulum_BAD_ARGUMENT;
+    const nambu_pendulum_params own = params != NULL ? *params : nambu_pendulum_default_params;
+    double x[3];
+    memcpy(x, x0, sizeof x);
+    for (int i = 0; i < 3; ++i)
+        if (!isfinite(x[i])) return nambu_pendulum_BAD_ARGUMENT;
+    memset(s, 0, sizeof *s);
+    memcpy(s->x, x, sizeof s->x);
+    s->params = own;
+    return nambu_pendulum_OK;
+}
+
 nambu_pendulum_status nambu_pendulum_init(nambu_pendulum_solver *s, const nambu_pendulum_params *params,
                                           const double x0[3])
 {
-    if (s == NULL || x0 == NULL) return nambu_pendulum_BAD_ARGUMENT;
-    for (int i = 0; i < 3; ++i)
-        if (!isfinite(x0[i])) return nambu_pendulum_BAD_ARGUMENT;
-    memset(s, 0, sizeof *s);
-    memcpy(s->x, x0, sizeof s->x);
-    s->params = params != NULL ? *params : nambu_pendulum_default_params;
-    return nambu_pendulum_OK;
+    return nambu_pendulum_start(s, params, x0);
 }
 
 /* What depends on the step size; nothing where that is as before. */
@@ -1950,14 +1959,15 @@ static nambu_pendulum_status nambu_pendulum_group_run(const nambu_pendulum_param
 nambu_pendulum_status nambu_pendulum_ensemble(const nambu_pendulum_params *params, double *x, size_t members,
                                               double h, size_t steps, unsigned char *status)
 {
-    nambu_pendulum_status worst = nambu_pendulum_OK;
+    nambu_pendulum_status worst = isfinite(h) ? nambu_pendulum_OK : nambu_pendulum_BAD_ARGUMENT;
+    const nambu_pendulum_params own = params != NULL ? *params : nambu_pendulum_default_params;
     size_t earliest = members;
     if (x == NULL && members > 0) return nambu_pendulum_BAD_ARGUMENT;
 #ifdef _OPENMP
 #pragma omp parallel for schedule(dynamic)
 #endif
     for (size_t first = 0; first < members; first += nambu_pendulum_LANES) {
-        const nambu_pendulum_status group = nambu_pendulum_group_run(params, x, members, first, h, steps, status);
+        const nambu_pendulum_status group = nambu_pendulum_group_run(&own, x, members, first, h, steps, status);
         if (group == nambu_pendulum_OK) continue;
 #ifdef _OPENMP
 #pragma omp critical
@@ -1985,7 +1995,8 @@ static void nambu_pendulum_energy(const nambu_pendulum_params *params, const dou
 }
 
 /* the Casimirs */
-void nambu_pendulum_casimirs(const nambu_pendulum_params *params, const double x[3], double out[])
+static void nambu_pendulum_casimir_values(const nambu_pendulum_params *params, const double x[3],
+                                          double out[restrict 1])
 {
     (void)params;
     const double theta = x[0];
@@ -1994,7 +2005,8 @@ void nambu_pendulum_casimirs(const nambu_pendulum_params *params, const double x
 }
 
 /* pi(x) grad H(x) */
-void nambu_pendulum_vector_field(const nambu_pendulum_params *params, const double x[3], double out[3])
+static void nambu_pendulum_field(const nambu_pendulum_params *params, const double x[3],
+                                 double out[restrict 3])
 {
     (void)params;
     const double theta = x[0];
@@ -2012,6 +2024,20 @@ double nambu_pendulum_hamiltonian(const nambu_pendulum_params *params, const dou
     return energy[0];
 }
 
+void nambu_pendulum_casimirs(const nambu_pendulum_params *params, const double x[3], double out[])
+{
+    double value[1]; /* out may overlap x */
+    nambu_pendulum_casimir_values(params != NULL ? params : &nambu_pendulum_default_params, x, value);
+    for (int i = 0; i < 1; ++i) out[i] = value[i];
+}
+
+void nambu_pendulum_vector_field(const nambu_pendulum_params *params, const double x[3], double out[3])
+{
+    double value[3];
+    nambu_pendulum_field(params != NULL ? params : &nambu_pendulum_default_params, x, value);
+    memcpy(out, value, sizeof value);
+}
+
 const char *nambu_pendulum_status_string(nambu_pendulum_status status)
 {
     switch (status) {
@@ -2019,7 +2045,7 @@ const char *nambu_pendulum_status_string(nambu_pendulum_status status)
     case nambu_pendulum_NO_CONVERGENCE: return "no convergence: the step is too large";
     case nambu_pendulum_SINGULAR: return "singular Newton matrix: the step is too large";
     case nambu_pendulum_NOT_FINITE: return "not finite: overflow, or outside the domain";
-    case nambu_pendulum_BAD_ARGUMENT: return "bad argument: a null pointer, or a value that is not finite";
+    case nambu_pendulum_BAD_ARGUMENT: return "bad argument: a null pointer, or values that are not allowed";
     }
     return "unknown status";
 }

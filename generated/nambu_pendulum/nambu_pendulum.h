@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: e9e8e11111b662796bded01f5b040e34329c4727642a24b95deaf171cdf1e3a9
+ * body-sha256: 34750e7df133fc2f7e0aff100bfa72396d112e4beac5370e3005e1bf6b919189
  */
 #ifndef NAMBU_PENDULUM_H
 #define NAMBU_PENDULUM_H
@@ -42,7 +42,7 @@ typedef enum {
     nambu_pendulum_NO_CONVERGENCE, /* the inner solve did not converge: the step is too large */
     nambu_pendulum_SINGULAR,       /* the Newton matrix is singular: the step is too large */
     nambu_pendulum_NOT_FINITE,     /* infinity or NaN: overflow, or outside the domain */
-    nambu_pendulum_BAD_ARGUMENT    /* a null pointer, or a value that is not finite */
+    nambu_pendulum_BAD_ARGUMENT    /* a null pointer, a value that is not finite, or parameters that are not allowed */
 } nambu_pendulum_status;
 
 /* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
@@ -79,7 +79,9 @@ typedef struct {
     nambu_pendulum_memory memory[1];
 } nambu_pendulum_solver;
 
-/* Start at x0. params may be NULL for the defaults. */
+/* Start at x0. params may be NULL for the defaults. Arguments of all functions may be parts of the solver, or overlap.
+   nambu_pendulum_BAD_ARGUMENT, and *s as before, if x0 or a parameter is not finite, one that has to be positive is not, or
+   what is computed from parameters alone is not finite. */
 nambu_pendulum_status nambu_pendulum_init(nambu_pendulum_solver *s, const nambu_pendulum_params *params,
                                           const double x0[3]);
 

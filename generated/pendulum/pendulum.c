@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 352cccf1964dee0fdbd2ccf236971b85a054825765917b687b2455db2a8399f1
+ * body-sha256: 0bf6d26854b29999e504d775dff812220ab3cc12ec53f253aecb3a5ca3736662
  */
 #include "pendulum.h"
 
@@ -450,15 +450,37 @@ static pendulum_status pendulum_stages(pendulum_solver *s)
     return pendulum_OK;
 }
 
-pendulum_status pendulum_init(pendulum_solver *s, const pendulum_params *params, const double x0[2])
+/* Whether steps can be made with these parameters: finite, positive where the spec says so, and with finite
+   coefficients for a step so short that it has no part in it. */
+static int pendulum_admissible(const pendulum_params *params)
+{
+    double coef[19];
+    if (!(isfinite(params->g) && params->g > 0.0)) return 0;
+    pendulum_prepare(params, 1e-100, coef);
+    for (int k = 0; k < 19; ++k)
+        if (!isfinite(coef[k])) return 0;
+    return 1;
+}
+
+/* All of pendulum_init but the gauge. The arguments may be parts of *s: they are read before it is written. */
+static pendulum_status pendulum_start(pendulum_solver *s, const pendulum_params *params, const double x0[2])
 {
     if (s == NULL || x0 == NULL) return pendulum_BAD_ARGUMENT;
+    const pendulum_params own = params != NULL ? *params : pendulum_default_params;
+    double x[2];
+    memcpy(x, x0, sizeof x);
     for (int i = 0; i < 2; ++i)
-        if (!isfinite(x0[i])) return pendulum_BAD_ARGUMENT;
+        if (!isfinite(x[i])) return pendulum_BAD_ARGUMENT;
+    if (!pendulum_admissible(&own)) return pendulum_BAD_ARGUMENT;
     memset(s, 0, sizeof *s);
-    memcpy(s->x, x0, sizeof s->x);
-    s->params = params != NULL ? *params : pendulum_default_params;
+    memcpy(s->x, x, sizeof s->x);
+    s->params = own;
     return pendulum_OK;
+}
+
+pendulum_status pendulum_init(pendulum_solver *s, const pendulum_params *params, const double x0[2])
+{
+    return pendulum_start(s, params, x0);
 }
 
 /* What depends on the step size; nothing where that is as before. */
@@ -1309,14 +1331,15 @@ static pendulum_status pendulum_group_run(const pendulum_params *params, double 
 pendulum_status pendulum_ensemble(const pendulum_params *params, double *x, size_t members, double h,
                                   size_t steps, unsigned char *status)
 {
-    pendulum_status worst = pendulum_OK;
+    pendulum_status worst = isfinite(h) ? pendulum_OK : pendulum_BAD_ARGUMENT;
+    const pendulum_params own = params != NULL ? *params : pendulum_default_params;
     size_t earliest = members;
     if (x == NULL && members > 0) return pendulum_BAD_ARGUMENT;
 #ifdef _OPENMP
 #pragma omp parallel for schedule(dynamic)
 #endif
     for (size_t first = 0; first < members; first += pendulum_LANES) {
-        const pendulum_status group = pendulum_group_run(params, x, members, first, h, steps, status);
+        const pendulum_status group = pendulum_group_run(&own, x, members, first, h, steps, status);
         if (group == pendulum_OK) continue;
 #ifdef _OPENMP
 #pragma omp critical
@@ -1342,7 +1365,7 @@ static void pendulum_energy(const pendulum_params *params, const double x[2], do
 }
 
 /* the Casimirs */
-void pendulum_casimirs(const pendulum_params *params, const double x[2], double out[])
+static void pendulum_casimir_values(const pendulum_params *params, const double x[2], double out[restrict 1])
 {
     (void)params;
     (void)x;
@@ -1350,9 +1373,8 @@ void pendulum_casimirs(const pendulum_params *params, const double x[2], double 
 }
 
 /* pi(x) grad H(x) */
-void pendulum_vector_field(const pendulum_params *params, const double x[2], double out[2])
+static void pendulum_field(const pendulum_params *params, const double x[2], double out[restrict 2])
 {
-    if (params == NULL) params = &pendulum_default_params;
     const double q = x[0];
     const double p = x[1];
     out[0] = p;
@@ -1366,6 +1388,20 @@ double pendulum_hamiltonian(const pendulum_params *params, const double x[2])
     return energy[0];
 }
 
+void pendulum_casimirs(const pendulum_params *params, const double x[2], double out[])
+{
+    double value[1]; /* out may overlap x */
+    pendulum_casimir_values(params != NULL ? params : &pendulum_default_params, x, value);
+    for (int i = 0; i < 0; ++i) out[i] = value[i];
+}
+
+void pendulum_vector_field(const pendulum_params *params, const double x[2], double out[2])
+{
+    double value[2];
+    pendulum_field(params != NULL ? params : &pendulum_default_params, x, value);
+    memcpy(out, value, sizeof value);
+}
+
 const char *pendulum_status_string(pendulum_status status)
 {
     switch (status) {
@@ -1373,7 +1409,7 @@ const char *pendulum_status_string(pendulum_status status)
     case pendulum_NO_CONVERGENCE: return "no convergence: the step is too large";
     case pendulum_SINGULAR: return "singular Newton matrix: the step is too large";
     case pendulum_NOT_FINITE: return "not finite: overflow, or outside the domain";
-    case pendulum_BAD_ARGUMENT: return "bad argument: a null pointer, or a value that is not finite";
+    case pendulum_BAD_ARGUMENT: return "bad argument: a null pointer, or values that are not allowed";
     }
     return "unknown status";
 }

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 89cb9d0e5df295a8a2aa1fdfc250b2c847cbfce39e95473c0ac661626c3dc578
+ * body-sha256: 2ab5bca5f0f2c8a1c75e56222942274c834c7d553bb93ca03111e479d7702a25
  */
 #ifndef PENDULUM_H
 #define PENDULUM_H
@@ -42,7 +42,7 @@ typedef enum {
     pendulum_NO_CONVERGENCE, /* the inner solve did not converge: the step is too large */
     pendulum_SINGULAR,       /* the Newton matrix is singular: the step is too large */
     pendulum_NOT_FINITE,     /* infinity or NaN: overflow, or outside the domain */
-    pendulum_BAD_ARGUMENT    /* a null pointer, or a value that is not finite */
+    pendulum_BAD_ARGUMENT    /* a null pointer, a value that is not finite, or parameters that are not allowed */
 } pendulum_status;
 
 /* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
@@ -79,7 +79,9 @@ typedef struct {
     pendulum_memory memory[1];
 } pendulum_solver;
 
-/* Start at x0. params may be NULL for the defaults. */
+/* Start at x0. params may be NULL for the defaults. Arguments of all functions may be parts of the solver, or overlap.
+   pendulum_BAD_ARGUMENT, and *s as before, if x0 or a parameter is not finite, one that has to be positive is not, or
+   what is computed from parameters alone is not finite. */
 pendulum_status pendulum_init(pendulum_solver *s, const pendulum_params *params, const double x0[2]);
 
 /* One step of size h, of either sign. On failure the state is as before. */

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 5b48cf3a3ddd678076464cf173119acf8f02cc23a32d90255eb9fb3bf6fdecbb
+ * body-sha256: b17d4896d661fd3c0a13b66599a61d5b8034e097062a24f11447bb721484451b
  */
 #include "pendulum_euler.h"
 
@@ -98,16 +98,38 @@ static pendulum_euler_status pendulum_euler_stages(pendulum_euler_solver *s)
     return pendulum_euler_OK;
 }
 
+/* Whether steps can be made with these parameters: finite, positive where the spec says so, and with finite
+   coefficients for a step so short that it has no part in it. */
+static int pendulum_euler_admissible(const pendulum_euler_params *params)
+{
+    double coef[2];
+    if (!(isfinite(params->g) && params->g > 0.0)) return 0;
+    pendulum_euler_prepare(params, 1e-100, coef);
+    for (int k = 0; k < 2; ++k)
+        if (!isfinite(coef[k])) return 0;
+    return 1;
+}
+
+/* All of pendulum_euler_init but the gauge. The arguments may be parts of *s: they are read before it is written. */
+static pendulum_euler_status pendulum_euler_start(pendulum_euler_solver *s, const pendulum_euler_params *params, const double x0[2])
+{
+    if (s == NULL || x0 == NULL) return pendulum_euler_BAD_ARGUMENT;
+    const pendulum_euler_params own = params != NULL ? *params : pendulum_euler_default_params;
+    double x[2];
+    memcpy(x, x0, sizeof x);
+    for (int i = 0; i < 2; ++i)
+        if (!isfinite(x[i])) return pendulum_euler_BAD_ARGUMENT;
+    if (!pendulum_euler_admissible(&own)) return pendulum_euler_BAD_ARGUMENT;
+    memset(s, 0, sizeof *s);
+    memcpy(s->x, x, sizeof s->x);
+    s->params = own;
+    return pendulum_euler_OK;
+}
+
 pendulum_euler_status pendulum_euler_init(pendulum_euler_solver *s, const pendulum_euler_params *params,
                                           const double x0[2])
 {
-    if (s == NULL || x0 == NULL) return pendulum_euler_BAD_ARGUMENT;
-    for (int i = 0; i < 2; ++i)
-        if (!isfinite(x0[i])) return pendulum_euler_BAD_ARGUMENT;
-    memset(s, 0, sizeof *s);
-    memcpy(s->x, x0, sizeof s->x);
-    s->params = params != NULL ? *params : pendulum_euler_default_params;
-    return pendulum_euler_OK;
+    return pendulum_euler_start(s, params, x0);
 }
 
 /* What depends on the step size; nothing where that is as before. */
@@ -133,11 +155,9 @@ pendulum_euler_status pendulum_euler_step(pendulum_euler_solver *s, double h)
 
 pendulum_euler_status pendulum_euler_integrate(pendulum_euler_solver *s, double h, size_t steps)
 {
-    for (size_t k = 0; k < steps; ++k) {
-        const pendulum_euler_status status = pendulum_euler_step(s, h);
-        if (status != pendulum_euler_OK) return status;
-    }
-    return pendulum_euler_OK;
+    pendulum_euler_status status = pendulum_euler_set_step(s, h);
+    for (size_t k = 0; k < steps && status == pendulum_euler_OK; ++k) status = pendulum_euler_step(s, h);
+    return status;
 }
 
 /*
@@ -339,14 +359,15 @@ pendulum_euler_APART static pendulum_euler_status pendulum_euler_group_run(
 pendulum_euler_status pendulum_euler_ensemble(const pendulum_euler_params *params, double *x, size_t members,
                                               double h, size_t steps, unsigned char *status)
 {
-    pendulum_euler_status worst = pendulum_euler_OK;
+    pendulum_euler_status worst = isfinite(h) ? pendulum_euler_OK : pendulum_euler_BAD_ARGUMENT;
+    const pendulum_euler_params own = params != NULL ? *params : pendulum_euler_default_params;
     size_t earliest = members;
     if (x == NULL && members > 0) return pendulum_euler_BAD_ARGUMENT;
 #ifdef _OPENMP
 #pragma omp parallel for schedule(dynamic)
 #endif
     for (size_t first = 0; first < members; first += pendulum_euler_GROUP) {
-        const pendulum_euler_status group = pendulum_euler_group_run(params, x, members, first, h, steps, status);
+        const pendulum_euler_status group = pendulum_euler_group_run(&own, x, members, first, h, steps, status);
         if (group == pendulum_euler_OK) continue;
 #ifdef _OPENMP
 #pragma omp critical
@@ -373,7 +394,8 @@ static void pendulum_euler_energy(const pendulum_euler_params *params, const dou
 }
 
 /* the Casimirs */
-void pendulum_euler_casimirs(const pendulum_euler_params *params, const double x[2], double out[])
+static void pendulum_euler_casimir_values(const pendulum_euler_params *params, const double x[2],
+                                          double out[restrict 1])
 {
     (void)params;
     (void)x;
@@ -381,9 +403,9 @@ void pendulum_euler_casimirs(const pendulum_euler_params *params, const double x
 }
 
 /* pi(x) grad H(x) */
-void pendulum_euler_vector_field(const pendulum_euler_params *params, const double x[2], double out[2])
+static void pendulum_euler_field(const pendulum_euler_params *params, const double x[2],
+                                 double out[restrict 2])
 {
-    if (params == NULL) params = &pendulum_euler_default_params;
     const double q = x[0];
     const double p = x[1];
     out[0] = p;
@@ -397,6 +419,20 @@ double pendulum_euler_hamiltonian(const pendulum_euler_params *params, const dou
     return energy[0];
 }
 
+void pendulum_euler_casimirs(const pendulum_euler_params *params, const double x[2], double out[])
+{
+    double value[1]; /* out may overlap x */
+    pendulum_euler_casimir_values(params != NULL ? params : &pendulum_euler_default_params, x, value);
+    for (int i = 0; i < 0; ++i) out[i] = value[i];
+}
+
+void pendulum_euler_vector_field(const pendulum_euler_params *params, const double x[2], double out[2])
+{
+    double value[2];
+    pendulum_euler_field(params != NULL ? params : &pendulum_euler_default_params, x, value);
+    memcpy(out, value, sizeof value);
+}
+
 const char *pendulum_euler_status_string(pendulum_euler_status status)
 {
     switch (status) {
@@ -404,7 +440,7 @@ const char *pendulum_euler_status_string(pendulum_euler_status status)
     case pendulum_euler_NO_CONVERGENCE: return "no convergence: the step is too large";
     case pendulum_euler_SINGULAR: return "singular Newton matrix: the step is too large";
     case pendulum_euler_NOT_FINITE: return "not finite: overflow, or outside the domain";
-    case pendulum_euler_BAD_ARGUMENT: return "bad argument: a null pointer, or a value that is not finite";
+    case pendulum_euler_BAD_ARGUMENT: return "bad argument: a null pointer, or values that are not allowed";
     }
     return "unknown status";
 }

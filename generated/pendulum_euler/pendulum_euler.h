@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 0234ece9f529afcd16a615023a1cf9b9464b1e15bbe3a1206fe927758fe3df5a
+ * body-sha256: f837eaa6f3812890ef2ebb3a17a1c5bc2013c1a25bfa7bc61e511bd87992dca8
  */
 #ifndef PENDULUM_EULER_H
 #define PENDULUM_EULER_H
@@ -42,7 +42,7 @@ typedef enum {
     pendulum_euler_NO_CONVERGENCE, /* the inner solve did not converge: the step is too large */
     pendulum_euler_SINGULAR,       /* the Newton matrix is singular: the step is too large */
     pendulum_euler_NOT_FINITE,     /* infinity or NaN: overflow, or outside the domain */
-    pendulum_euler_BAD_ARGUMENT    /* a null pointer, or a value that is not finite */
+    pendulum_euler_BAD_ARGUMENT    /* a null pointer, a value that is not finite, or parameters that are not allowed */
 } pendulum_euler_status;
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with pendulum_euler_init. */
@@ -57,7 +57,9 @@ typedef struct {
     double coef[1][2]; /* what depends on params and h only, for each stage */
 } pendulum_euler_solver;
 
-/* Start at x0. params may be NULL for the defaults. */
+/* Start at x0. params may be NULL for the defaults. Arguments of all functions may be parts of the solver, or overlap.
+   pendulum_euler_BAD_ARGUMENT, and *s as before, if x0 or a parameter is not finite, one that has to be positive is not, or
+   what is computed from parameters alone is not finite. */
 pendulum_euler_status pendulum_euler_init(pendulum_euler_solver *s, const pendulum_euler_params *params,
                                           const double x0[2]);
 

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 1bd53dab2e96f9ffe97586305c0fb4340be55da6bf7fc0c083a924d987b1bf20
+ * body-sha256: 85e4ee3402345b59751c9312142cfde73df46a90a3eda68239b6a36b266cc186
  */
 #include "poisson_not_hamiltonian.h"
 
@@ -553,17 +553,26 @@ static poisson_not_hamiltonian_status poisson_not_hamiltonian_stages(poisson_not
     return poisson_not_hamiltonian_OK;
 }
 
+/* All of poisson_not_hamiltonian_init but the gauge. The arguments may be parts of *s: they are read before it is written. */
+static poisson_not_hamiltonian_status poisson_not_hamiltonian_start(poisson_not_hamiltonian_solver *s, const poisson_not_hamiltonian_params *params, const double x0[3])
+{
+    if (s == NULL || x0 == NULL) return poisson_not_hamiltonian_BAD_ARGUMENT;
+    const poisson_not_hamiltonian_params own = params != NULL ? *params : poisson_not_hamiltonian_default_params;
+    double x[3];
+    memcpy(x, x0, sizeof x);
+    for (int i = 0; i < 3; ++i)
+        if (!isfinite(x[i])) return poisson_not_hamiltonian_BAD_ARGUMENT;
+    memset(s, 0, sizeof *s);
+    memcpy(s->x, x, sizeof s->x);
+    s->params = own;
+    return poisson_not_hamiltonian_OK;
+}
+
 poisson_not_hamiltonian_status poisson_not_hamiltonian_init(poisson_not_hamiltonian_solver *s,
                                                             const poisson_not_hamiltonian_params *params,
                                                             const double x0[3])
 {
-    if (s == NULL || x0 == NULL) return poisson_not_hamiltonian_BAD_ARGUMENT;
-    for (int i = 0; i < 3; ++i)
-        if (!isfinite(x0[i])) return poisson_not_hamiltonian_BAD_ARGUMENT;
-    memset(s, 0, sizeof *s);
-    memcpy(s->x, x0, sizeof s->x);
-    s->params = params != NULL ? *params : poisson_not_hamiltonian_default_params;
-    return poisson_not_hamiltonian_OK;
+    return poisson_not_hamiltonian_start(s, params, x0);
 }
 
 /* What depends on the step size; nothing where that is as before. */
@@ -1610,14 +1619,15 @@ poisson_not_hamiltonian_status poisson_not_hamiltonian_ensemble(const poisson_no
                                                                 double *x, size_t members, double h,
                                                                 size_t steps, unsigned char *status)
 {
-    poisson_not_hamiltonian_status worst = poisson_not_hamiltonian_OK;
+    poisson_not_hamiltonian_status worst = isfinite(h) ? poisson_not_hamiltonian_OK : poisson_not_hamiltonian_BAD_ARGUMENT;
+    const poisson_not_hamiltonian_params own = params != NULL ? *params : poisson_not_hamiltonian_default_params;
     size_t earliest = members;
     if (x == NULL && members > 0) return poisson_not_hamiltonian_BAD_ARGUMENT;
 #ifdef _OPENMP
 #pragma omp parallel for schedule(dynamic)
 #endif
     for (size_t first = 0; first < members; first += poisson_not_hamiltonian_LANES) {
-        const poisson_not_hamiltonian_status group = poisson_not_hamiltonian_group_run(params, x, members, first, h, steps, status);
+        const poisson_not_hamiltonian_status group = poisson_not_hamiltonian_group_run(&own, x, members, first, h, steps, status);
         if (group == poisson_not_hamiltonian_OK) continue;
 #ifdef _OPENMP
 #pragma omp critical
@@ -1647,8 +1657,8 @@ static void poisson_not_hamiltonian_energy(const poisson_not_hamiltonian_params 
 }
 
 /* the Casimirs */
-void poisson_not_hamiltonian_casimirs(const poisson_not_hamiltonian_params *params, const double x[3],
-                                      double out[])
+static void poisson_not_hamiltonian_casimir_values(const poisson_not_hamiltonian_params *params,
+                                                   const double x[3], double out[restrict 1])
 {
     (void)params;
     const double x_ = x[0];
@@ -1658,8 +1668,8 @@ void poisson_not_hamiltonian_casimirs(const poisson_not_hamiltonian_params *para
 }
 
 /* pi(x) grad H(x) */
-void poisson_not_hamiltonian_vector_field(const poisson_not_hamiltonian_params *params, const double x[3],
-                                          double out[3])
+static void poisson_not_hamiltonian_field(const poisson_not_hamiltonian_params *params, const double x[3],
+                                          double out[restrict 3])
 {
     (void)params;
     const double x_ = x[0];
@@ -1681,6 +1691,22 @@ double poisson_not_hamiltonian_hamiltonian(const poisson_not_hamiltonian_params 
     return energy[0];
 }
 
+void poisson_not_hamiltonian_casimirs(const poisson_not_hamiltonian_params *params, const double x[3],
+                                      double out[])
+{
+    double value[1]; /* out may overlap x */
+    poisson_not_hamiltonian_casimir_values(params != NULL ? params : &poisson_not_hamiltonian_default_params, x, value);
+    for (int i = 0; i < 1; ++i) out[i] = value[i];
+}
+
+void poisson_not_hamiltonian_vector_field(const poisson_not_hamiltonian_params *params, const double x[3],
+                                          double out[3])
+{
+    double value[3];
+    poisson_not_hamiltonian_field(params != NULL ? params : &poisson_not_hamiltonian_default_params, x, value);
+    memcpy(out, value, sizeof value);
+}
+
 const char *poisson_not_hamiltonian_status_string(poisson_not_hamiltonian_status status)
 {
     switch (status) {
@@ -1688,7 +1714,7 @@ const char *poisson_not_hamiltonian_status_string(poisson_not_hamiltonian_status
     case poisson_not_hamiltonian_NO_CONVERGENCE: return "no convergence: the step is too large";
     case poisson_not_hamiltonian_SINGULAR: return "singular Newton matrix: the step is too large";
     case poisson_not_hamiltonian_NOT_FINITE: return "not finite: overflow, or outside the domain";
-    case poisson_not_hamiltonian_BAD_ARGUMENT: return "bad argument: a null pointer, or a value that is not finite";
+    case poisson_not_hamiltonian_BAD_ARGUMENT: return "bad argument: a null pointer, or values that are not allowed";
     }
     return "unknown status";
 }

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: be2464a45c10d9a70ead08572b5c2278e7137183b92abf322ec7ee192d66b981
+ * body-sha256: cd9109b0feab12b2fd2c2731cd8d9f67a81de5570604cafd9f95ee557592b177
  */
 #ifndef POISSON_NOT_HAMILTONIAN_H
 #define POISSON_NOT_HAMILTONIAN_H
@@ -42,7 +42,7 @@ typedef enum {
     poisson_not_hamiltonian_NO_CONVERGENCE, /* the inner solve did not converge: the step is too large */
     poisson_not_hamiltonian_SINGULAR,       /* the Newton matrix is singular: the step is too large */
     poisson_not_hamiltonian_NOT_FINITE,     /* infinity or NaN: overflow, or outside the domain */
-    poisson_not_hamiltonian_BAD_ARGUMENT    /* a null pointer, or a value that is not finite */
+    poisson_not_hamiltonian_BAD_ARGUMENT    /* a null pointer, a value that is not finite, or parameters that are not allowed */
 } poisson_not_hamiltonian_status;
 
 /* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
@@ -79,7 +79,9 @@ typedef struct {
     poisson_not_hamiltonian_memory memory[1];
 } poisson_not_hamiltonian_solver;
 
-/* Start at x0. params may be NULL for the defaults. */
+/* Start at x0. params may be NULL for the defaults. Arguments of all functions may be parts of the solver, or overlap.
+   poisson_not_hamiltonian_BAD_ARGUMENT, and *s as before, if x0 or a parameter is not finite, one that has to be positive is not, or
+   what is computed from parameters alone is not finite. */
 poisson_not_hamiltonian_status poisson_not_hamiltonian_init(poisson_not_hamiltonian_solver *s,
                                                             const poisson_not_hamiltonian_params *params,
                                                             const double x0[3]);
@@ -101,10 +103,12 @@ poisson_not_hamiltonian_status poisson_not_hamiltonian_ensemble(const poisson_no
 double poisson_not_hamiltonian_hamiltonian(const poisson_not_hamiltonian_params *params, const double x[3]);
 
 /* Casimirs: C = out[0]. */
-void poisson_not_hamiltonian_casimirs(const poisson_not_hamiltonian_params *params, const double x[3], double out[]);
+void poisson_not_hamiltonian_casimirs(const poisson_not_hamiltonian_params *params, const double x[3],
+                                      double out[]);
 
 /* The right-hand side pi(x) grad H(x). */
-void poisson_not_hamiltonian_vector_field(const poisson_not_hamiltonian_params *params, const double x[3], double out[3]);
+void poisson_not_hamiltonian_vector_field(const poisson_not_hamiltonian_params *params, const double x[3],
+                                          double out[3]);
 
 const char *poisson_not_hamiltonian_status_string(poisson_not_hamiltonian_status status);
 

@@ -12,7 +12,7 @@
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 254171456d5493e392f70982ba7c005de23b97a77eec0fba2a8078e57768da33
+# body-sha256: 451fe58f17ee8bdd2deababf2ec665bbc789e538fd0afd7ade59af7b1de66e77
 import numpy as np
 
 VERSION = "0.1.0"
@@ -23,6 +23,9 @@ COORDINATES = ("x", "y", "z",)
 CASIMIRS = ("C",)
 DEFAULT_PARAMETERS = {
 }
+
+# Parameters that have to be positive.
+POSITIVE = ()
 
 # Casimirs whose multiples the solver subtracts from the Hamiltonian before discretising: see gauge().
 GAUGE = ()
@@ -41,13 +44,6 @@ class StepError(ArithmeticError):
     def __init__(self, step, status, members, states):
         super().__init__(f"step {step}: {status}, members {members}")
         self.step, self.status, self.members, self.states = step, status, members, states
-
-
-def _values(parameters):
-    unknown = sorted(set(parameters) - set(DEFAULT_PARAMETERS))
-    if unknown:
-        raise TypeError(f"unknown parameters {unknown}; known are {sorted(DEFAULT_PARAMETERS)}")
-    return {**DEFAULT_PARAMETERS, **parameters}
 
 
 def _at(coef, members):
@@ -69,6 +65,26 @@ def _sum(x, carry, change):
     total = x + change
     added = total - x
     return total, (x - (total - added)) + (change - added)
+
+
+def _values(parameters):
+    """All parameters, as numbers of NumPy: dividing by zero, they give infinity."""
+    unknown = sorted(set(parameters) - set(DEFAULT_PARAMETERS))
+    if unknown:
+        raise TypeError(f"unknown parameters {unknown}; known are {sorted(DEFAULT_PARAMETERS)}")
+    return {name: np.asarray(value, dtype=float)[()] for name, value in {**DEFAULT_PARAMETERS, **parameters}.items()}
+
+
+def _admissible(values):
+    """Whether steps can be made with these parameters.
+
+    They have to be finite, positive where the spec says so, and to give finite coefficients for a step so short that
+    it has no part in it.
+    """
+    if not np.isfinite(list(values.values())).all() or not all(values[name] > 0.0 for name in POSITIVE):
+        return False
+    with np.errstate(all="ignore"):
+        return all(np.isfinite(c).all() for c in _prepare(values, 1e-100))
 
 
 def _prepare(parameters, h):
@@ -354,8 +370,8 @@ def step(x, h, gauge=None, **parameters):
 def integrate(x0, h, steps, stride=1, gauge=None, **parameters):
     """States at steps 0, stride, 2*stride, ... and at the last step: shape (rows, ..., DIM).
 
-    x0 has shape (..., DIM): leading axes are members, each integrated by itself. Raises StepError as soon as a
-    step of a member fails. gauge (one value for each Casimir in GAUGE) overrides the choice of the solver: the step
+    x0 has shape (..., DIM): leading axes are members, each integrated by itself. Raises ValueError for arguments that
+    are not allowed, and StepError as soon as a step of a member fails. gauge (one value for each Casimir in GAUGE) overrides the choice of the solver: the step
     is an exact Poisson map for each fixed gauge.
     """
     x = np.array(x0, dtype=float)
@@ -365,13 +381,16 @@ def integrate(x0, h, steps, stride=1, gauge=None, **parameters):
         raise ValueError("steps must be at least 0 and stride at least 1")
     if not (np.isfinite(x).all() and np.isfinite(h)):
         raise ValueError("x0 and h must be finite")
+    values = _values(parameters)
+    if not _admissible(values):
+        raise ValueError(f"no step can be made with the parameters { {**DEFAULT_PARAMETERS, **parameters} }")
     shape = x.shape
     x = x.reshape(-1, DIM)
     carry = np.zeros_like(x)
     memory = [(carry, carry)] * len(FRACTIONS)
     rows = [x]
     with np.errstate(all="ignore"):
-        stages = _coefficients(_values(parameters), x, float(h), gauge)
+        stages = _coefficients(values, x, float(h), gauge)
         for done in range(steps):
             following = x
             for k, stage in enumerate(stages):
@@ -421,14 +440,17 @@ def _vector_field(parameters, x):
 
 def hamiltonian(x, **parameters):
     """The Hamiltonian at x: (..., DIM) -> (...)."""
-    return _energy(_values(parameters), np.asarray(x, dtype=float))[..., 0]
+    with np.errstate(all="ignore"):
+        return _energy(_values(parameters), np.asarray(x, dtype=float))[..., 0]
 
 
 def casimirs(x, **parameters):
     """The Casimirs at x, in the order of CASIMIRS: (..., DIM) -> (..., number of Casimirs)."""
-    return _casimirs(_values(parameters), np.asarray(x, dtype=float))
+    with np.errstate(all="ignore"):
+        return _casimirs(_values(parameters), np.asarray(x, dtype=float))
 
 
 def vector_field(x, **parameters):
     """The right-hand side pi(x) grad H(x): (..., DIM) -> (..., DIM)."""
-    return _vector_field(_values(parameters), np.asarray(x, dtype=float))
+    with np.errstate(all="ignore"):
+        return _vector_field(_values(parameters), np.asarray(x, dtype=float))

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 4dc57272f5fc4aa80e6d5b7e84bace5364befe3dc6b0229769e1810a4f22c485
+ * body-sha256: 7fca46db915f1110d27b2283f3a757603c5af43bda3547e31e388a40fc3dc5cf
  */
 #include "predator_prey.h"
 
@@ -450,16 +450,41 @@ static predator_prey_status predator_prey_stages(predator_prey_solver *s)
     return predator_prey_OK;
 }
 
+/* Whether steps can be made with these parameters: finite, positive where the spec says so, and with finite
+   coefficients for a step so short that it has no part in it. */
+static int predator_prey_admissible(const predator_prey_params *params)
+{
+    double coef[11];
+    if (!(isfinite(params->growth) && params->growth > 0.0)) return 0;
+    if (!(isfinite(params->attack) && params->attack > 0.0)) return 0;
+    if (!(isfinite(params->gain) && params->gain > 0.0)) return 0;
+    if (!(isfinite(params->death) && params->death > 0.0)) return 0;
+    predator_prey_prepare(params, 1e-100, coef);
+    for (int k = 0; k < 11; ++k)
+        if (!isfinite(coef[k])) return 0;
+    return 1;
+}
+
+/* All of predator_prey_init but the gauge. The arguments may be parts of *s: they are read before it is written. */
+static predator_prey_status predator_prey_start(predator_prey_solver *s, const predator_prey_params *params, const double x0[2])
+{
+    if (s == NULL || x0 == NULL) return predator_prey_BAD_ARGUMENT;
+    const predator_prey_params own = params != NULL ? *params : predator_prey_default_params;
+    double x[2];
+    memcpy(x, x0, sizeof x);
+    for (int i = 0; i < 2; ++i)
+        if (!isfinite(x[i])) return predator_prey_BAD_ARGUMENT;
+    if (!predator_prey_admissible(&own)) return predator_prey_BAD_ARGUMENT;
+    memset(s, 0, sizeof *s);
+    memcpy(s->x, x, sizeof s->x);
+    s->params = own;
+    return predator_prey_OK;
+}
+
 predator_prey_status predator_prey_init(predator_prey_solver *s, const predator_prey_params *params,
                                         const double x0[2])
 {
-    if (s == NULL || x0 == NULL) return predator_prey_BAD_ARGUMENT;
-    for (int i = 0; i < 2; ++i)
-        if (!isfinite(x0[i])) return predator_prey_BAD_ARGUMENT;
-    memset(s, 0, sizeof *s);
-    memcpy(s->x, x0, sizeof s->x);
-    s->params = params != NULL ? *params : predator_prey_default_params;
-    return predator_prey_OK;
+    return predator_prey_start(s, params, x0);
 }
 
 /* What depends on the step size; nothing where that is as before. */
@@ -1303,14 +1328,15 @@ static predator_prey_status predator_prey_group_run(const predator_prey_params *
 predator_prey_status predator_prey_ensemble(const predator_prey_params *params, double *x, size_t members,
                                             double h, size_t steps, unsigned char *status)
 {
-    predator_prey_status worst = predator_prey_OK;
+    predator_prey_status worst = isfinite(h) ? predator_prey_OK : predator_prey_BAD_ARGUMENT;
+    const predator_prey_params own = params != NULL ? *params : predator_prey_default_params;
     size_t earliest = members;
     if (x == NULL && members > 0) return predator_prey_BAD_ARGUMENT;
 #ifdef _OPENMP
 #pragma omp parallel for schedule(dynamic)
 #endif
     for (size_t first = 0; first < members; first += predator_prey_LANES) {
-        const predator_prey_status group = predator_prey_group_run(params, x, members, first, h, steps, status);
+        const predator_prey_status group = predator_prey_group_run(&own, x, members, first, h, steps, status);
         if (group == predator_prey_OK) continue;
 #ifdef _OPENMP
 #pragma omp critical
@@ -1337,7 +1363,8 @@ static void predator_prey_energy(const predator_prey_params *params, const doubl
 }
 
 /* the Casimirs */
-void predator_prey_casimirs(const predator_prey_params *params, const double x[2], double out[])
+static void predator_prey_casimir_values(const predator_prey_params *params, const double x[2],
+                                         double out[restrict 1])
 {
     (void)params;
     (void)x;
@@ -1345,9 +1372,8 @@ void predator_prey_casimirs(const predator_prey_params *params, const double x[2
 }
 
 /* pi(x) grad H(x) */
-void predator_prey_vector_field(const predator_prey_params *params, const double x[2], double out[2])
+static void predator_prey_field(const predator_prey_params *params, const double x[2], double out[restrict 2])
 {
-    if (params == NULL) params = &predator_prey_default_params;
     const double prey = x[0];
     const double predator = x[1];
     const double t1 = predator * prey;
@@ -1362,6 +1388,20 @@ double predator_prey_hamiltonian(const predator_prey_params *params, const doubl
     return energy[0];
 }
 
+void predator_prey_casimirs(const predator_prey_params *params, const double x[2], double out[])
+{
+    double value[1]; /* out may overlap x */
+    predator_prey_casimir_values(params != NULL ? params : &predator_prey_default_params, x, value);
+    for (int i = 0; i < 0; ++i) out[i] = value[i];
+}
+
+void predator_prey_vector_field(const predator_prey_params *params, const double x[2], double out[2])
+{
+    double value[2];
+    predator_prey_field(params != NULL ? params : &predator_prey_default_params, x, value);
+    memcpy(out, value, sizeof value);
+}
+
 const char *predator_prey_status_string(predator_prey_status status)
 {
     switch (status) {
@@ -1369,7 +1409,7 @@ const char *predator_prey_status_string(predator_prey_status status)
     case predator_prey_NO_CONVERGENCE: return "no convergence: the step is too large";
     case predator_prey_SINGULAR: return "singular Newton matrix: the step is too large";
     case predator_prey_NOT_FINITE: return "not finite: overflow, or outside the domain";
-    case predator_prey_BAD_ARGUMENT: return "bad argument: a null pointer, or a value that is not finite";
+    case predator_prey_BAD_ARGUMENT: return "bad argument: a null pointer, or values that are not allowed";
     }
     return "unknown status";
 }

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 3927b9912520a122d524210a2e745efe1facee0eabe5f5e5bc90d556fb78d68b
+ * body-sha256: 5e66afee3457415baadb2bb372d1cb34740c30cfe64dec2b6e9cdb7aba613986
  */
 #ifndef PREDATOR_PREY_H
 #define PREDATOR_PREY_H
@@ -45,7 +45,7 @@ typedef enum {
     predator_prey_NO_CONVERGENCE, /* the inner solve did not converge: the step is too large */
     predator_prey_SINGULAR,       /* the Newton matrix is singular: the step is too large */
     predator_prey_NOT_FINITE,     /* infinity or NaN: overflow, or outside the domain */
-    predator_prey_BAD_ARGUMENT    /* a null pointer, or a value that is not finite */
+    predator_prey_BAD_ARGUMENT    /* a null pointer, a value that is not finite, or parameters that are not allowed */
 } predator_prey_status;
 
 /* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
@@ -82,7 +82,9 @@ typedef struct {
     predator_prey_memory memory[1];
 } predator_prey_solver;
 
-/* Start at x0. params may be NULL for the defaults. */
+/* Start at x0. params may be NULL for the defaults. Arguments of all functions may be parts of the solver, or overlap.
+   predator_prey_BAD_ARGUMENT, and *s as before, if x0 or a parameter is not finite, one that has to be positive is not, or
+   what is computed from parameters alone is not finite. */
 predator_prey_status predator_prey_init(predator_prey_solver *s, const predator_prey_params *params,
                                         const double x0[2]);
 

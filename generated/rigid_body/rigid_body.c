@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 4feca9e7c903fad727a8dd4edb22d98e2c694c63f18e555ce00d1d98a14eccb9
+ * body-sha256: df62ab5b74b691e71fcc0abf6fbb652be8d1a672a3769f9a325da4fb62cedc9a
  */
 #include "rigid_body.h"
 
@@ -718,6 +718,37 @@ static rigid_body_status rigid_body_stages(rigid_body_solver *s)
     return rigid_body_OK;
 }
 
+/* Whether steps can be made with these parameters: finite, positive where the spec says so, and with finite
+   coefficients for a step so short that it has no part in it. */
+static int rigid_body_admissible(const rigid_body_params *params)
+{
+    double coef[35];
+    const double gauge[1] = { 0.0 };
+    if (!(isfinite(params->I1) && params->I1 > 0.0)) return 0;
+    if (!(isfinite(params->I2) && params->I2 > 0.0)) return 0;
+    if (!(isfinite(params->I3) && params->I3 > 0.0)) return 0;
+    rigid_body_prepare(params, gauge, 1e-100, coef);
+    for (int k = 0; k < 35; ++k)
+        if (!isfinite(coef[k])) return 0;
+    return 1;
+}
+
+/* All of rigid_body_init but the gauge. The arguments may be parts of *s: they are read before it is written. */
+static rigid_body_status rigid_body_start(rigid_body_solver *s, const rigid_body_params *params, const double x0[3])
+{
+    if (s == NULL || x0 == NULL) return rigid_body_BAD_ARGUMENT;
+    const rigid_body_params own = params != NULL ? *params : rigid_body_default_params;
+    double x[3];
+    memcpy(x, x0, sizeof x);
+    for (int i = 0; i < 3; ++i)
+        if (!isfinite(x[i])) return rigid_body_BAD_ARGUMENT;
+    if (!rigid_body_admissible(&own)) return rigid_body_BAD_ARGUMENT;
+    memset(s, 0, sizeof *s);
+    memcpy(s->x, x, sizeof s->x);
+    s->params = own;
+    return rigid_body_OK;
+}
+
 /* the leading error vector pi grad S_3, as a function of the gauge */
 static void rigid_body_guide(const rigid_body_params *params, const double gauge[1], const double x[3],
                              double error[restrict 3])
@@ -882,23 +913,21 @@ static void rigid_body_choose_gauge(const rigid_body_params *params, const doubl
 rigid_body_status rigid_body_init_gauge(rigid_body_solver *s, const rigid_body_params *params,
                                         const double x0[3], const double gauge[1])
 {
-    for (int c = 0; gauge != NULL && c < 1; ++c)
-        if (!isfinite(gauge[c])) return rigid_body_BAD_ARGUMENT;
-    const rigid_body_status status = rigid_body_init(s, params, x0);
-    if (status == rigid_body_OK && gauge != NULL) memcpy(s->gauge, gauge, sizeof s->gauge);
+    double own[1];
+    if (gauge == NULL) return rigid_body_init(s, params, x0);
+    memcpy(own, gauge, sizeof own);
+    for (int c = 0; c < 1; ++c)
+        if (!isfinite(own[c])) return rigid_body_BAD_ARGUMENT;
+    const rigid_body_status status = rigid_body_start(s, params, x0);
+    if (status == rigid_body_OK) memcpy(s->gauge, own, sizeof s->gauge);
     return status;
 }
 
 rigid_body_status rigid_body_init(rigid_body_solver *s, const rigid_body_params *params, const double x0[3])
 {
-    if (s == NULL || x0 == NULL) return rigid_body_BAD_ARGUMENT;
-    for (int i = 0; i < 3; ++i)
-        if (!isfinite(x0[i])) return rigid_body_BAD_ARGUMENT;
-    memset(s, 0, sizeof *s);
-    memcpy(s->x, x0, sizeof s->x);
-    s->params = params != NULL ? *params : rigid_body_default_params;
-    rigid_body_choose_gauge(&s->params, s->x, s->gauge);
-    return rigid_body_OK;
+    const rigid_body_status status = rigid_body_start(s, params, x0);
+    if (status == rigid_body_OK) rigid_body_choose_gauge(&s->params, s->x, s->gauge);
+    return status;
 }
 
 /* What depends on the step size; nothing where that is as before. */
@@ -1843,14 +1872,15 @@ static rigid_body_status rigid_body_group_run(const rigid_body_params *params, d
 rigid_body_status rigid_body_ensemble(const rigid_body_params *params, double *x, size_t members, double h,
                                       size_t steps, unsigned char *status)
 {
-    rigid_body_status worst = rigid_body_OK;
+    rigid_body_status worst = isfinite(h) ? rigid_body_OK : rigid_body_BAD_ARGUMENT;
+    const rigid_body_params own = params != NULL ? *params : rigid_body_default_params;
     size_t earliest = members;
     if (x == NULL && members > 0) return rigid_body_BAD_ARGUMENT;
 #ifdef _OPENMP
 #pragma omp parallel for schedule(dynamic)
 #endif
     for (size_t first = 0; first < members; first += rigid_body_LANES) {
-        const rigid_body_status group = rigid_body_group_run(params, x, members, first, h, steps, status);
+        const rigid_body_status group = rigid_body_group_run(&own, x, members, first, h, steps, status);
         if (group == rigid_body_OK) continue;
 #ifdef _OPENMP
 #pragma omp critical
@@ -1877,7 +1907,8 @@ static void rigid_body_energy(const rigid_body_params *params, const double x[3]
 }
 
 /* the Casimirs */
-void rigid_body_casimirs(const rigid_body_params *params, const double x[3], double out[])
+static void rigid_body_casimir_values(const rigid_body_params *params, const double x[3],
+                                      double out[restrict 1])
 {
     (void)params;
     const double x1 = x[0];
@@ -1887,9 +1918,8 @@ void rigid_body_casimirs(const rigid_body_params *params, const double x[3], dou
 }
 
 /* pi(x) grad H(x) */
-void rigid_body_vector_field(const rigid_body_params *params, const double x[3], double out[3])
+static void rigid_body_field(const rigid_body_params *params, const double x[3], double out[restrict 3])
 {
-    if (params == NULL) params = &rigid_body_default_params;
     const double x1 = x[0];
     const double x2 = x[1];
     const double x3 = x[2];
@@ -1908,6 +1938,20 @@ double rigid_body_hamiltonian(const rigid_body_params *params, const double x[3]
     return energy[0];
 }
 
+void rigid_body_casimirs(const rigid_body_params *params, const double x[3], double out[])
+{
+    double value[1]; /* out may overlap x */
+    rigid_body_casimir_values(params != NULL ? params : &rigid_body_default_params, x, value);
+    for (int i = 0; i < 1; ++i) out[i] = value[i];
+}
+
+void rigid_body_vector_field(const rigid_body_params *params, const double x[3], double out[3])
+{
+    double value[3];
+    rigid_body_field(params != NULL ? params : &rigid_body_default_params, x, value);
+    memcpy(out, value, sizeof value);
+}
+
 const char *rigid_body_status_string(rigid_body_status status)
 {
     switch (status) {
@@ -1915,7 +1959,7 @@ const char *rigid_body_status_string(rigid_body_status status)
     case rigid_body_NO_CONVERGENCE: return "no convergence: the step is too large";
     case rigid_body_SINGULAR: return "singular Newton matrix: the step is too large";
     case rigid_body_NOT_FINITE: return "not finite: overflow, or outside the domain";
-    case rigid_body_BAD_ARGUMENT: return "bad argument: a null pointer, or a value that is not finite";
+    case rigid_body_BAD_ARGUMENT: return "bad argument: a null pointer, or values that are not allowed";
     }
     return "unknown status";
 }

@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 68d33921102605ee3fc957fefcc4a1034b65440899e63279f4701336c6fbd9ab
+ * body-sha256: 122d583cf1a1769d8600d7fe98bdc6d51918fa207a1722656be7c1339ed84b6e
  */
 #ifndef RIGID_BODY_H
 #define RIGID_BODY_H
@@ -45,7 +45,7 @@ typedef enum {
     rigid_body_NO_CONVERGENCE, /* the inner solve did not converge: the step is too large */
     rigid_body_SINGULAR,       /* the Newton matrix is singular: the step is too large */
     rigid_body_NOT_FINITE,     /* infinity or NaN: overflow, or outside the domain */
-    rigid_body_BAD_ARGUMENT    /* a null pointer, or a value that is not finite */
+    rigid_body_BAD_ARGUMENT    /* a null pointer, a value that is not finite, or parameters that are not allowed */
 } rigid_body_status;
 
 /* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
@@ -83,7 +83,9 @@ typedef struct {
     rigid_body_memory memory[1];
 } rigid_body_solver;
 
-/* Start at x0. params may be NULL for the defaults. */
+/* Start at x0. params may be NULL for the defaults. Arguments of all functions may be parts of the solver, or overlap.
+   rigid_body_BAD_ARGUMENT, and *s as before, if x0 or a parameter is not finite, one that has to be positive is not, or
+   what is computed from parameters alone is not finite. */
 rigid_body_status rigid_body_init(rigid_body_solver *s, const rigid_body_params *params, const double x0[3]);
 
 /* Start at x0 with a gauge of one's own: the step is an exact Poisson map for each fixed gauge. */

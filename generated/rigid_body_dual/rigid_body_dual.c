@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 7fc11c4f5e8b3ba724a09b6a693c61f06eae4fa7ca15a23d5e758fb66867affb
+ * body-sha256: 4ef340116760e9e398f76ebc0565eae1590eb5b706905269b058169ced8acfe9
  */
 #include "rigid_body_dual.h"
 
@@ -604,6 +604,37 @@ static rigid_body_dual_status rigid_body_dual_stages(rigid_body_dual_solver *s)
     return rigid_body_dual_OK;
 }
 
+/* Whether steps can be made with these parameters: finite, positive where the spec says so, and with finite
+   coefficients for a step so short that it has no part in it. */
+static int rigid_body_dual_admissible(const rigid_body_dual_params *params)
+{
+    double coef[12];
+    const double gauge[1] = { 0.0 };
+    if (!(isfinite(params->I1) && params->I1 > 0.0)) return 0;
+    if (!(isfinite(params->I2) && params->I2 > 0.0)) return 0;
+    if (!(isfinite(params->I3) && params->I3 > 0.0)) return 0;
+    rigid_body_dual_prepare(params, gauge, 1e-100, coef);
+    for (int k = 0; k < 12; ++k)
+        if (!isfinite(coef[k])) return 0;
+    return 1;
+}
+
+/* All of rigid_body_dual_init but the gauge. The arguments may be parts of *s: they are read before it is written. */
+static rigid_body_dual_status rigid_body_dual_start(rigid_body_dual_solver *s, const rigid_body_dual_params *params, const double x0[3])
+{
+    if (s == NULL || x0 == NULL) return rigid_body_dual_BAD_ARGUMENT;
+    const rigid_body_dual_params own = params != NULL ? *params : rigid_body_dual_default_params;
+    double x[3];
+    memcpy(x, x0, sizeof x);
+    for (int i = 0; i < 3; ++i)
+        if (!isfinite(x[i])) return rigid_body_dual_BAD_ARGUMENT;
+    if (!rigid_body_dual_admissible(&own)) return rigid_body_dual_BAD_ARGUMENT;
+    memset(s, 0, sizeof *s);
+    memcpy(s->x, x, sizeof s->x);
+    s->params = own;
+    return rigid_body_dual_OK;
+}
+
 /* the leading error vector pi grad S_3, as a function of the gauge */
 static void rigid_body_dual_guide(const rigid_body_dual_params *params, const double gauge[1],
                                   const double x[3], double error[restrict 3])
@@ -775,24 +806,22 @@ rigid_body_dual_status rigid_body_dual_init_gauge(rigid_body_dual_solver *s,
                                                   const rigid_body_dual_params *params, const double x0[3],
                                                   const double gauge[1])
 {
-    for (int c = 0; gauge != NULL && c < 1; ++c)
-        if (!isfinite(gauge[c])) return rigid_body_dual_BAD_ARGUMENT;
-    const rigid_body_dual_status status = rigid_body_dual_init(s, params, x0);
-    if (status == rigid_body_dual_OK && gauge != NULL) memcpy(s->gauge, gauge, sizeof s->gauge);
+    double own[1];
+    if (gauge == NULL) return rigid_body_dual_init(s, params, x0);
+    memcpy(own, gauge, sizeof own);
+    for (int c = 0; c < 1; ++c)
+        if (!isfinite(own[c])) return rigid_body_dual_BAD_ARGUMENT;
+    const rigid_body_dual_status status = rigid_body_dual_start(s, params, x0);
+    if (status == rigid_body_dual_OK) memcpy(s->gauge, own, sizeof s->gauge);
     return status;
 }
 
 rigid_body_dual_status rigid_body_dual_init(rigid_body_dual_solver *s, const rigid_body_dual_params *params,
                                             const double x0[3])
 {
-    if (s == NULL || x0 == NULL) return rigid_body_dual_BAD_ARGUMENT;
-    for (int i = 0; i < 3; ++i)
-        if (!isfinite(x0[i])) return rigid_body_dual_BAD_ARGUMENT;
-    memset(s, 0, sizeof *s);
-    memcpy(s->x, x0, sizeof s->x);
-    s->params = params != NULL ? *params : rigid_body_dual_default_params;
-    rigid_body_dual_choose_gauge(&s->params, s->x, s->gauge);
-    return rigid_body_dual_OK;
+    const rigid_body_dual_status status = rigid_body_dual_start(s, params, x0);
+    if (status == rigid_body_dual_OK) rigid_body_dual_choose_gauge(&s->params, s->x, s->gauge);
+    return status;
 }
 
 /* What depends on the step size; nothing where that is as before. */
@@ -1743,14 +1772,15 @@ static rigid_body_dual_status rigid_body_dual_group_run(const rigid_body_dual_pa
 rigid_body_dual_status rigid_body_dual_ensemble(const rigid_body_dual_params *params, double *x,
                                                 size_t members, double h, size_t steps, unsigned char *status)
 {
-    rigid_body_dual_status worst = rigid_body_dual_OK;
+    rigid_body_dual_status worst = isfinite(h) ? rigid_body_dual_OK : rigid_body_dual_BAD_ARGUMENT;
+    const rigid_body_dual_params own = params != NULL ? *params : rigid_body_dual_default_params;
     size_t earliest = members;
     if (x == NULL && members > 0) return rigid_body_dual_BAD_ARGUMENT;
 #ifdef _OPENMP
 #pragma omp parallel for schedule(dynamic)
 #endif
     for (size_t first = 0; first < members; first += rigid_body_dual_LANES) {
-        const rigid_body_dual_status group = rigid_body_dual_group_run(params, x, members, first, h, steps, status);
+        const rigid_body_dual_status group = rigid_body_dual_group_run(&own, x, members, first, h, steps, status);
         if (group == rigid_body_dual_OK) continue;
 #ifdef _OPENMP
 #pragma omp critical
@@ -1779,9 +1809,9 @@ static void rigid_body_dual_energy(const rigid_body_dual_params *params, const d
 }
 
 /* the Casimirs */
-void rigid_body_dual_casimirs(const rigid_body_dual_params *params, const double x[3], double out[])
+static void rigid_body_dual_casimir_values(const rigid_body_dual_params *params, const double x[3],
+                                           double out[restrict 1])
 {
-    if (params == NULL) params = &rigid_body_dual_default_params;
     const double x1 = x[0];
     const double x2 = x[1];
     const double x3 = x[2];
@@ -1789,9 +1819,9 @@ void rigid_body_dual_casimirs(const rigid_body_dual_params *params, const double
 }
 
 /* pi(x) grad H(x) */
-void rigid_body_dual_vector_field(const rigid_body_dual_params *params, const double x[3], double out[3])
+static void rigid_body_dual_field(const rigid_body_dual_params *params, const double x[3],
+                                  double out[restrict 3])
 {
-    if (params == NULL) params = &rigid_body_dual_default_params;
     const double x1 = x[0];
     const double x2 = x[1];
     const double x3 = x[2];
@@ -1810,6 +1840,20 @@ double rigid_body_dual_hamiltonian(const rigid_body_dual_params *params, const d
     return energy[0];
 }
 
+void rigid_body_dual_casimirs(const rigid_body_dual_params *params, const double x[3], double out[])
+{
+    double value[1]; /* out may overlap x */
+    rigid_body_dual_casimir_values(params != NULL ? params : &rigid_body_dual_default_params, x, value);
+    for (int i = 0; i < 1; ++i) out[i] = value[i];
+}
+
+void rigid_body_dual_vector_field(const rigid_body_dual_params *params, const double x[3], double out[3])
+{
+    double value[3];
+    rigid_body_dual_field(params != NULL ? params : &rigid_body_dual_default_params, x, value);
+    memcpy(out, value, sizeof value);
+}
+
 const char *rigid_body_dual_status_string(rigid_body_dual_status status)
 {
     switch (status) {
@@ -1817,7 +1861,7 @@ const char *rigid_body_dual_status_string(rigid_body_dual_status status)
     case rigid_body_dual_NO_CONVERGENCE: return "no convergence: the step is too large";
     case rigid_body_dual_SINGULAR: return "singular Newton matrix: the step is too large";
     case rigid_body_dual_NOT_FINITE: return "not finite: overflow, or outside the domain";
-    case rigid_body_dual_BAD_ARGUMENT: return "bad argument: a null pointer, or a value that is not finite";
+    case rigid_body_dual_BAD_ARGUMENT: return "bad argument: a null pointer, or values that are not allowed";
     }
     return "unknown status";
 }

@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: e032c332cd59f77215c24fb65f74b214b40003bca5e7b159b63d650c984dfccf
+ * body-sha256: f8754b364d408bb058f66b9f6b95940526450dc114f42482296d10c2020a3ddd
  */
 #ifndef RIGID_BODY_DUAL_H
 #define RIGID_BODY_DUAL_H
@@ -45,7 +45,7 @@ typedef enum {
     rigid_body_dual_NO_CONVERGENCE, /* the inner solve did not converge: the step is too large */
     rigid_body_dual_SINGULAR,       /* the Newton matrix is singular: the step is too large */
     rigid_body_dual_NOT_FINITE,     /* infinity or NaN: overflow, or outside the domain */
-    rigid_body_dual_BAD_ARGUMENT    /* a null pointer, or a value that is not finite */
+    rigid_body_dual_BAD_ARGUMENT    /* a null pointer, a value that is not finite, or parameters that are not allowed */
 } rigid_body_dual_status;
 
 /* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
@@ -83,7 +83,9 @@ typedef struct {
     rigid_body_dual_memory memory[1];
 } rigid_body_dual_solver;
 
-/* Start at x0. params may be NULL for the defaults. */
+/* Start at x0. params may be NULL for the defaults. Arguments of all functions may be parts of the solver, or overlap.
+   rigid_body_dual_BAD_ARGUMENT, and *s as before, if x0 or a parameter is not finite, one that has to be positive is not, or
+   what is computed from parameters alone is not finite. */
 rigid_body_dual_status rigid_body_dual_init(rigid_body_dual_solver *s, const rigid_body_dual_params *params,
                                             const double x0[3]);
 

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: a48b3165595ffac5cb2d357bf8258b79862049e8dc2284915a7e1bcf254d9fe9
+ * body-sha256: 5f2cabc607b166a42b5641c01c911d14a06f896d1584a2d4c54d5b33a24b7bf5
  */
 #include "rigid_body_paper.h"
 
@@ -560,16 +560,40 @@ static rigid_body_paper_status rigid_body_paper_stages(rigid_body_paper_solver *
     return rigid_body_paper_OK;
 }
 
+/* Whether steps can be made with these parameters: finite, positive where the spec says so, and with finite
+   coefficients for a step so short that it has no part in it. */
+static int rigid_body_paper_admissible(const rigid_body_paper_params *params)
+{
+    double coef[3];
+    if (!(isfinite(params->J1) && params->J1 > 0.0)) return 0;
+    if (!(isfinite(params->J2) && params->J2 > 0.0)) return 0;
+    if (!(isfinite(params->J3) && params->J3 > 0.0)) return 0;
+    rigid_body_paper_prepare(params, 1e-100, coef);
+    for (int k = 0; k < 3; ++k)
+        if (!isfinite(coef[k])) return 0;
+    return 1;
+}
+
+/* All of rigid_body_paper_init but the gauge. The arguments may be parts of *s: they are read before it is written. */
+static rigid_body_paper_status rigid_body_paper_start(rigid_body_paper_solver *s, const rigid_body_paper_params *params, const double x0[3])
+{
+    if (s == NULL || x0 == NULL) return rigid_body_paper_BAD_ARGUMENT;
+    const rigid_body_paper_params own = params != NULL ? *params : rigid_body_paper_default_params;
+    double x[3];
+    memcpy(x, x0, sizeof x);
+    for (int i = 0; i < 3; ++i)
+        if (!isfinite(x[i])) return rigid_body_paper_BAD_ARGUMENT;
+    if (!rigid_body_paper_admissible(&own)) return rigid_body_paper_BAD_ARGUMENT;
+    memset(s, 0, sizeof *s);
+    memcpy(s->x, x, sizeof s->x);
+    s->params = own;
+    return rigid_body_paper_OK;
+}
+
 rigid_body_paper_status rigid_body_paper_init(rigid_body_paper_solver *s,
                                               const rigid_body_paper_params *params, const double x0[3])
 {
-    if (s == NULL || x0 == NULL) return rigid_body_paper_BAD_ARGUMENT;
-    for (int i = 0; i < 3; ++i)
-        if (!isfinite(x0[i])) return rigid_body_paper_BAD_ARGUMENT;
-    memset(s, 0, sizeof *s);
-    memcpy(s->x, x0, sizeof s->x);
-    s->params = params != NULL ? *params : rigid_body_paper_default_params;
-    return rigid_body_paper_OK;
+    return rigid_body_paper_start(s, params, x0);
 }
 
 /* What depends on the step size; nothing where that is as before. */
@@ -1484,14 +1508,15 @@ rigid_body_paper_status rigid_body_paper_ensemble(const rigid_body_paper_params 
                                                   size_t members, double h, size_t steps,
                                                   unsigned char *status)
 {
-    rigid_body_paper_status worst = rigid_body_paper_OK;
+    rigid_body_paper_status worst = isfinite(h) ? rigid_body_paper_OK : rigid_body_paper_BAD_ARGUMENT;
+    const rigid_body_paper_params own = params != NULL ? *params : rigid_body_paper_default_params;
     size_t earliest = members;
     if (x == NULL && members > 0) return rigid_body_paper_BAD_ARGUMENT;
 #ifdef _OPENMP
 #pragma omp parallel for schedule(dynamic)
 #endif
     for (size_t first = 0; first < members; first += rigid_body_paper_LANES) {
-        const rigid_body_paper_status group = rigid_body_paper_group_run(params, x, members, first, h, steps, status);
+        const rigid_body_paper_status group = rigid_body_paper_group_run(&own, x, members, first, h, steps, status);
         if (group == rigid_body_paper_OK) continue;
 #ifdef _OPENMP
 #pragma omp critical
@@ -1519,7 +1544,8 @@ static void rigid_body_paper_energy(const rigid_body_paper_params *params, const
 }
 
 /* the Casimirs */
-void rigid_body_paper_casimirs(const rigid_body_paper_params *params, const double x[3], double out[])
+static void rigid_body_paper_casimir_values(const rigid_body_paper_params *params, const double x[3],
+                                            double out[restrict 1])
 {
     (void)params;
     const double x1 = x[0];
@@ -1529,9 +1555,9 @@ void rigid_body_paper_casimirs(const rigid_body_paper_params *params, const doub
 }
 
 /* pi(x) grad H(x) */
-void rigid_body_paper_vector_field(const rigid_body_paper_params *params, const double x[3], double out[3])
+static void rigid_body_paper_field(const rigid_body_paper_params *params, const double x[3],
+                                   double out[restrict 3])
 {
-    if (params == NULL) params = &rigid_body_paper_default_params;
     const double x1 = x[0];
     const double x2 = x[1];
     const double x3 = x[2];
@@ -1550,6 +1576,20 @@ double rigid_body_paper_hamiltonian(const rigid_body_paper_params *params, const
     return energy[0];
 }
 
+void rigid_body_paper_casimirs(const rigid_body_paper_params *params, const double x[3], double out[])
+{
+    double value[1]; /* out may overlap x */
+    rigid_body_paper_casimir_values(params != NULL ? params : &rigid_body_paper_default_params, x, value);
+    for (int i = 0; i < 1; ++i) out[i] = value[i];
+}
+
+void rigid_body_paper_vector_field(const rigid_body_paper_params *params, const double x[3], double out[3])
+{
+    double value[3];
+    rigid_body_paper_field(params != NULL ? params : &rigid_body_paper_default_params, x, value);
+    memcpy(out, value, sizeof value);
+}
+
 const char *rigid_body_paper_status_string(rigid_body_paper_status status)
 {
     switch (status) {
@@ -1557,7 +1597,7 @@ const char *rigid_body_paper_status_string(rigid_body_paper_status status)
     case rigid_body_paper_NO_CONVERGENCE: return "no convergence: the step is too large";
     case rigid_body_paper_SINGULAR: return "singular Newton matrix: the step is too large";
     case rigid_body_paper_NOT_FINITE: return "not finite: overflow, or outside the domain";
-    case rigid_body_paper_BAD_ARGUMENT: return "bad argument: a null pointer, or a value that is not finite";
+    case rigid_body_paper_BAD_ARGUMENT: return "bad argument: a null pointer, or values that are not allowed";
     }
     return "unknown status";
 }

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: a1a719738fabcd96b02f4560c68deec37ace0bb5eb82529be59c46eef5c66ca1
+ * body-sha256: aa40f8eb6463f47ec6eb1838d630abc9f8aabd3328a6ab5056b8870f994b57d6
  */
 #ifndef RIGID_BODY_PAPER_H
 #define RIGID_BODY_PAPER_H
@@ -44,7 +44,7 @@ typedef enum {
     rigid_body_paper_NO_CONVERGENCE, /* the inner solve did not converge: the step is too large */
     rigid_body_paper_SINGULAR,       /* the Newton matrix is singular: the step is too large */
     rigid_body_paper_NOT_FINITE,     /* infinity or NaN: overflow, or outside the domain */
-    rigid_body_paper_BAD_ARGUMENT    /* a null pointer, or a value that is not finite */
+    rigid_body_paper_BAD_ARGUMENT    /* a null pointer, a value that is not finite, or parameters that are not allowed */
 } rigid_body_paper_status;
 
 /* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
@@ -81,7 +81,9 @@ typedef struct {
     rigid_body_paper_memory memory[1];
 } rigid_body_paper_solver;
 
-/* Start at x0. params may be NULL for the defaults. */
+/* Start at x0. params may be NULL for the defaults. Arguments of all functions may be parts of the solver, or overlap.
+   rigid_body_paper_BAD_ARGUMENT, and *s as before, if x0 or a parameter is not finite, one that has to be positive is not, or
+   what is computed from parameters alone is not finite. */
 rigid_body_paper_status rigid_body_paper_init(rigid_body_paper_solver *s,
                                               const rigid_body_paper_params *params, const double x0[3]);
 

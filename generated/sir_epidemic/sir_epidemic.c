@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 7ee6004899d01d574815a21bd586c10a7ce76323311032a7870298361867504b
+ * body-sha256: ce74e93c2d503932b71f97b700cad6b04e2d1ca522ab09ea73504a54eff6954d
  */
 #include "sir_epidemic.h"
 
@@ -535,16 +535,39 @@ static sir_epidemic_status sir_epidemic_stages(sir_epidemic_solver *s)
     return sir_epidemic_OK;
 }
 
+/* Whether steps can be made with these parameters: finite, positive where the spec says so, and with finite
+   coefficients for a step so short that it has no part in it. */
+static int sir_epidemic_admissible(const sir_epidemic_params *params)
+{
+    double coef[4];
+    if (!(isfinite(params->beta) && params->beta > 0.0)) return 0;
+    if (!(isfinite(params->gamma_) && params->gamma_ > 0.0)) return 0;
+    sir_epidemic_prepare(params, 1e-100, coef);
+    for (int k = 0; k < 4; ++k)
+        if (!isfinite(coef[k])) return 0;
+    return 1;
+}
+
+/* All of sir_epidemic_init but the gauge. The arguments may be parts of *s: they are read before it is written. */
+static sir_epidemic_status sir_epidemic_start(sir_epidemic_solver *s, const sir_epidemic_params *params, const double x0[3])
+{
+    if (s == NULL || x0 == NULL) return sir_epidemic_BAD_ARGUMENT;
+    const sir_epidemic_params own = params != NULL ? *params : sir_epidemic_default_params;
+    double x[3];
+    memcpy(x, x0, sizeof x);
+    for (int i = 0; i < 3; ++i)
+        if (!isfinite(x[i])) return sir_epidemic_BAD_ARGUMENT;
+    if (!sir_epidemic_admissible(&own)) return sir_epidemic_BAD_ARGUMENT;
+    memset(s, 0, sizeof *s);
+    memcpy(s->x, x, sizeof s->x);
+    s->params = own;
+    return sir_epidemic_OK;
+}
+
 sir_epidemic_status sir_epidemic_init(sir_epidemic_solver *s, const sir_epidemic_params *params,
                                       const double x0[3])
 {
-    if (s == NULL || x0 == NULL) return sir_epidemic_BAD_ARGUMENT;
-    for (int i = 0; i < 3; ++i)
-        if (!isfinite(x0[i])) return sir_epidemic_BAD_ARGUMENT;
-    memset(s, 0, sizeof *s);
-    memcpy(s->x, x0, sizeof s->x);
-    s->params = params != NULL ? *params : sir_epidemic_default_params;
-    return sir_epidemic_OK;
+    return sir_epidemic_start(s, params, x0);
 }
 
 /* What depends on the step size; nothing where that is as before. */
@@ -1930,14 +1953,15 @@ static sir_epidemic_status sir_epidemic_group_run(const sir_epidemic_params *par
 sir_epidemic_status sir_epidemic_ensemble(const sir_epidemic_params *params, double *x, size_t members,
                                           double h, size_t steps, unsigned char *status)
 {
-    sir_epidemic_status worst = sir_epidemic_OK;
+    sir_epidemic_status worst = isfinite(h) ? sir_epidemic_OK : sir_epidemic_BAD_ARGUMENT;
+    const sir_epidemic_params own = params != NULL ? *params : sir_epidemic_default_params;
     size_t earliest = members;
     if (x == NULL && members > 0) return sir_epidemic_BAD_ARGUMENT;
 #ifdef _OPENMP
 #pragma omp parallel for schedule(dynamic)
 #endif
     for (size_t first = 0; first < members; first += sir_epidemic_LANES) {
-        const sir_epidemic_status group = sir_epidemic_group_run(params, x, members, first, h, steps, status);
+        const sir_epidemic_status group = sir_epidemic_group_run(&own, x, members, first, h, steps, status);
         if (group == sir_epidemic_OK) continue;
 #ifdef _OPENMP
 #pragma omp critical
@@ -1964,7 +1988,8 @@ static void sir_epidemic_energy(const sir_epidemic_params *params, const double 
 }
 
 /* the Casimirs */
-void sir_epidemic_casimirs(const sir_epidemic_params *params, const double x[3], double out[])
+static void sir_epidemic_casimir_values(const sir_epidemic_params *params, const double x[3],
+                                        double out[restrict 1])
 {
     (void)params;
     const double S = x[0];
@@ -1974,9 +1999,8 @@ void sir_epidemic_casimirs(const sir_epidemic_params *params, const double x[3],
 }
 
 /* pi(x) grad H(x) */
-void sir_epidemic_vector_field(const sir_epidemic_params *params, const double x[3], double out[3])
+static void sir_epidemic_field(const sir_epidemic_params *params, const double x[3], double out[restrict 3])
 {
-    if (params == NULL) params = &sir_epidemic_default_params;
     const double S = x[0];
     const double I_ = x[1];
     const double t1 = I_ * S;
@@ -1994,6 +2018,20 @@ double sir_epidemic_hamiltonian(const sir_epidemic_params *params, const double 
     return energy[0];
 }
 
+void sir_epidemic_casimirs(const sir_epidemic_params *params, const double x[3], double out[])
+{
+    double value[1]; /* out may overlap x */
+    sir_epidemic_casimir_values(params != NULL ? params : &sir_epidemic_default_params, x, value);
+    for (int i = 0; i < 1; ++i) out[i] = value[i];
+}
+
+void sir_epidemic_vector_field(const sir_epidemic_params *params, const double x[3], double out[3])
+{
+    double value[3];
+    sir_epidemic_field(params != NULL ? params : &sir_epidemic_default_params, x, value);
+    memcpy(out, value, sizeof value);
+}
+
 const char *sir_epidemic_status_string(sir_epidemic_status status)
 {
     switch (status) {
@@ -2001,7 +2039,7 @@ const char *sir_epidemic_status_string(sir_epidemic_status status)
     case sir_epidemic_NO_CONVERGENCE: return "no convergence: the step is too large";
     case sir_epidemic_SINGULAR: return "singular Newton matrix: the step is too large";
     case sir_epidemic_NOT_FINITE: return "not finite: overflow, or outside the domain";
-    case sir_epidemic_BAD_ARGUMENT: return "bad argument: a null pointer, or a value that is not finite";
+    case sir_epidemic_BAD_ARGUMENT: return "bad argument: a null pointer, or values that are not allowed";
     }
     return "unknown status";
 }

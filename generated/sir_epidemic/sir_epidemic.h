@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 792a7070ab58a316f55686eacea7a30529ef15d91c6e6a5288aa4b30207e443d
+ * body-sha256: c731168aef2e7ec243d0025ddb565595279fb305c11cc6f278509ab9074002ca
  */
 #ifndef SIR_EPIDEMIC_H
 #define SIR_EPIDEMIC_H
@@ -43,7 +43,7 @@ typedef enum {
     sir_epidemic_NO_CONVERGENCE, /* the inner solve did not converge: the step is too large */
     sir_epidemic_SINGULAR,       /* the Newton matrix is singular: the step is too large */
     sir_epidemic_NOT_FINITE,     /* infinity or NaN: overflow, or outside the domain */
-    sir_epidemic_BAD_ARGUMENT    /* a null pointer, or a value that is not finite */
+    sir_epidemic_BAD_ARGUMENT    /* a null pointer, a value that is not finite, or parameters that are not allowed */
 } sir_epidemic_status;
 
 /* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
@@ -80,7 +80,9 @@ typedef struct {
     sir_epidemic_memory memory[1];
 } sir_epidemic_solver;
 
-/* Start at x0. params may be NULL for the defaults. */
+/* Start at x0. params may be NULL for the defaults. Arguments of all functions may be parts of the solver, or overlap.
+   sir_epidemic_BAD_ARGUMENT, and *s as before, if x0 or a parameter is not finite, one that has to be positive is not, or
+   what is computed from parameters alone is not finite. */
 sir_epidemic_status sir_epidemic_init(sir_epidemic_solver *s, const sir_epidemic_params *params,
                                       const double x0[3]);
 

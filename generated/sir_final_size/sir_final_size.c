@@ -12,7 +12,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: cd47231dc6d07f8aa82d28aa16724a97f821a59c6bd311407601b4a8bc16906b
+ * body-sha256: 104b98711727a3eea45ebb14a7ba4e363cc6e418b8a17ac1cb667cd22c2dffbb
  */
 #include "sir_final_size.h"
 
@@ -537,16 +537,39 @@ static sir_final_size_status sir_final_size_stages(sir_final_size_solver *s)
     return sir_final_size_OK;
 }
 
+/* Whether steps can be made with these parameters: finite, positive where the spec says so, and with finite
+   coefficients for a step so short that it has no part in it. */
+static int sir_final_size_admissible(const sir_final_size_params *params)
+{
+    double coef[3];
+    if (!(isfinite(params->beta) && params->beta > 0.0)) return 0;
+    if (!(isfinite(params->gamma_) && params->gamma_ > 0.0)) return 0;
+    sir_final_size_prepare(params, 1e-100, coef);
+    for (int k = 0; k < 3; ++k)
+        if (!isfinite(coef[k])) return 0;
+    return 1;
+}
+
+/* All of sir_final_size_init but the gauge. The arguments may be parts of *s: they are read before it is written. */
+static sir_final_size_status sir_final_size_start(sir_final_size_solver *s, const sir_final_size_params *params, const double x0[3])
+{
+    if (s == NULL || x0 == NULL) return sir_final_size_BAD_ARGUMENT;
+    const sir_final_size_params own = params != NULL ? *params : sir_final_size_default_params;
+    double x[3];
+    memcpy(x, x0, sizeof x);
+    for (int i = 0; i < 3; ++i)
+        if (!isfinite(x[i])) return sir_final_size_BAD_ARGUMENT;
+    if (!sir_final_size_admissible(&own)) return sir_final_size_BAD_ARGUMENT;
+    memset(s, 0, sizeof *s);
+    memcpy(s->x, x, sizeof s->x);
+    s->params = own;
+    return sir_final_size_OK;
+}
+
 sir_final_size_status sir_final_size_init(sir_final_size_solver *s, const sir_final_size_params *params,
                                           const double x0[3])
 {
-    if (s == NULL || x0 == NULL) return sir_final_size_BAD_ARGUMENT;
-    for (int i = 0; i < 3; ++i)
-        if (!isfinite(x0[i])) return sir_final_size_BAD_ARGUMENT;
-    memset(s, 0, sizeof *s);
-    memcpy(s->x, x0, sizeof s->x);
-    s->params = params != NULL ? *params : sir_final_size_default_params;
-    return sir_final_size_OK;
+    return sir_final_size_start(s, params, x0);
 }
 
 /* What depends on the step size; nothing where that is as before. */
@@ -1945,14 +1968,15 @@ static sir_final_size_status sir_final_size_group_run(const sir_final_size_param
 sir_final_size_status sir_final_size_ensemble(const sir_final_size_params *params, double *x, size_t members,
                                               double h, size_t steps, unsigned char *status)
 {
-    sir_final_size_status worst = sir_final_size_OK;
+    sir_final_size_status worst = isfinite(h) ? sir_final_size_OK : sir_final_size_BAD_ARGUMENT;
+    const sir_final_size_params own = params != NULL ? *params : sir_final_size_default_params;
     size_t earliest = members;
     if (x == NULL && members > 0) return sir_final_size_BAD_ARGUMENT;
 #ifdef _OPENMP
 #pragma omp parallel for schedule(dynamic)
 #endif
     for (size_t first = 0; first < members; first += sir_final_size_LANES) {
-        const sir_final_size_status group = sir_final_size_group_run(params, x, members, first, h, steps, status);
+        const sir_final_size_status group = sir_final_size_group_run(&own, x, members, first, h, steps, status);
         if (group == sir_final_size_OK) continue;
 #ifdef _OPENMP
 #pragma omp critical
@@ -1981,18 +2005,18 @@ static void sir_final_size_energy(const sir_final_size_params *params, const dou
 }
 
 /* the Casimirs */
-void sir_final_size_casimirs(const sir_final_size_params *params, const double x[3], double out[])
+static void sir_final_size_casimir_values(const sir_final_size_params *params, const double x[3],
+                                          double out[restrict 1])
 {
-    if (params == NULL) params = &sir_final_size_default_params;
     const double S = x[0];
     const double I_ = x[1];
     out[0] = params->beta * (I_ + S) - params->gamma_ * log(S);
 }
 
 /* pi(x) grad H(x) */
-void sir_final_size_vector_field(const sir_final_size_params *params, const double x[3], double out[3])
+static void sir_final_size_field(const sir_final_size_params *params, const double x[3],
+                                 double out[restrict 3])
 {
-    if (params == NULL) params = &sir_final_size_default_params;
     const double S = x[0];
     const double I_ = x[1];
     const double t1 = I_ * (S * params->beta);
@@ -2009,6 +2033,20 @@ double sir_final_size_hamiltonian(const sir_final_size_params *params, const dou
     return energy[0];
 }
 
+void sir_final_size_casimirs(const sir_final_size_params *params, const double x[3], double out[])
+{
+    double value[1]; /* out may overlap x */
+    sir_final_size_casimir_values(params != NULL ? params : &sir_final_size_default_params, x, value);
+    for (int i = 0; i < 1; ++i) out[i] = value[i];
+}
+
+void sir_final_size_vector_field(const sir_final_size_params *params, const double x[3], double out[3])
+{
+    double value[3];
+    sir_final_size_field(params != NULL ? params : &sir_final_size_default_params, x, value);
+    memcpy(out, value, sizeof value);
+}
+
 const char *sir_final_size_status_string(sir_final_size_status status)
 {
     switch (status) {
@@ -2016,7 +2054,7 @@ const char *sir_final_size_status_string(sir_final_size_status status)
     case sir_final_size_NO_CONVERGENCE: return "no convergence: the step is too large";
     case sir_final_size_SINGULAR: return "singular Newton matrix: the step is too large";
     case sir_final_size_NOT_FINITE: return "not finite: overflow, or outside the domain";
-    case sir_final_size_BAD_ARGUMENT: return "bad argument: a null pointer, or a value that is not finite";
+    case sir_final_size_BAD_ARGUMENT: return "bad argument: a null pointer, or values that are not allowed";
     }
     return "unknown status";
 }

@@ -12,7 +12,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: b83c8d324b494bd36600fa62ab06dc10436fb611c0b365a3b8aa38789e8a2e0c
+ * body-sha256: 3cd5ea32adbcbd27dc27543630fc09e71694f1e30005a8255077215e8a71c0d1
  */
 #ifndef SIR_FINAL_SIZE_H
 #define SIR_FINAL_SIZE_H
@@ -42,7 +42,7 @@ typedef enum {
     sir_final_size_NO_CONVERGENCE, /* the inner solve did not converge: the step is too large */
     sir_final_size_SINGULAR,       /* the Newton matrix is singular: the step is too large */
     sir_final_size_NOT_FINITE,     /* infinity or NaN: overflow, or outside the domain */
-    sir_final_size_BAD_ARGUMENT    /* a null pointer, or a value that is not finite */
+    sir_final_size_BAD_ARGUMENT    /* a null pointer, a value that is not finite, or parameters that are not allowed */
 } sir_final_size_status;
 
 /* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
@@ -79,7 +79,9 @@ typedef struct {
     sir_final_size_memory memory[1];
 } sir_final_size_solver;
 
-/* Start at x0. params may be NULL for the defaults. */
+/* Start at x0. params may be NULL for the defaults. Arguments of all functions may be parts of the solver, or overlap.
+   sir_final_size_BAD_ARGUMENT, and *s as before, if x0 or a parameter is not finite, one that has to be positive is not, or
+   what is computed from parameters alone is not finite. */
 sir_final_size_status sir_final_size_init(sir_final_size_solver *s, const sir_final_size_params *params,
                                           const double x0[3]);
 

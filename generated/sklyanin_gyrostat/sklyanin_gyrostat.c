@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 07125a2c0057430bb584bc810a63af3a1ade6088ffe5f6298ccef23a77208ff5
+ * body-sha256: f23e8bd16203e55749c73697ac117678d96ad16248da97c00f02052690ac87eb
  */
 #include "sklyanin_gyrostat.h"
 
@@ -720,6 +720,21 @@ static sklyanin_gyrostat_status sklyanin_gyrostat_stages(sklyanin_gyrostat_solve
     return sklyanin_gyrostat_OK;
 }
 
+/* All of sklyanin_gyrostat_init but the gauge. The arguments may be parts of *s: they are read before it is written. */
+static sklyanin_gyrostat_status sklyanin_gyrostat_start(sklyanin_gyrostat_solver *s, const sklyanin_gyrostat_params *params, const double x0[4])
+{
+    if (s == NULL || x0 == NULL) return sklyanin_gyrostat_BAD_ARGUMENT;
+    const sklyanin_gyrostat_params own = params != NULL ? *params : sklyanin_gyrostat_default_params;
+    double x[4];
+    memcpy(x, x0, sizeof x);
+    for (int i = 0; i < 4; ++i)
+        if (!isfinite(x[i])) return sklyanin_gyrostat_BAD_ARGUMENT;
+    memset(s, 0, sizeof *s);
+    memcpy(s->x, x, sizeof s->x);
+    s->params = own;
+    return sklyanin_gyrostat_OK;
+}
+
 /* the leading error vector pi grad S_3, as a function of the gauge */
 static void sklyanin_gyrostat_guide(const sklyanin_gyrostat_params *params, const double gauge[1],
                                     const double x[4], double error[restrict 4])
@@ -886,24 +901,22 @@ sklyanin_gyrostat_status sklyanin_gyrostat_init_gauge(sklyanin_gyrostat_solver *
                                                       const sklyanin_gyrostat_params *params,
                                                       const double x0[4], const double gauge[1])
 {
-    for (int c = 0; gauge != NULL && c < 1; ++c)
-        if (!isfinite(gauge[c])) return sklyanin_gyrostat_BAD_ARGUMENT;
-    const sklyanin_gyrostat_status status = sklyanin_gyrostat_init(s, params, x0);
-    if (status == sklyanin_gyrostat_OK && gauge != NULL) memcpy(s->gauge, gauge, sizeof s->gauge);
+    double own[1];
+    if (gauge == NULL) return sklyanin_gyrostat_init(s, params, x0);
+    memcpy(own, gauge, sizeof own);
+    for (int c = 0; c < 1; ++c)
+        if (!isfinite(own[c])) return sklyanin_gyrostat_BAD_ARGUMENT;
+    const sklyanin_gyrostat_status status = sklyanin_gyrostat_start(s, params, x0);
+    if (status == sklyanin_gyrostat_OK) memcpy(s->gauge, own, sizeof s->gauge);
     return status;
 }
 
 sklyanin_gyrostat_status sklyanin_gyrostat_init(sklyanin_gyrostat_solver *s,
                                                 const sklyanin_gyrostat_params *params, const double x0[4])
 {
-    if (s == NULL || x0 == NULL) return sklyanin_gyrostat_BAD_ARGUMENT;
-    for (int i = 0; i < 4; ++i)
-        if (!isfinite(x0[i])) return sklyanin_gyrostat_BAD_ARGUMENT;
-    memset(s, 0, sizeof *s);
-    memcpy(s->x, x0, sizeof s->x);
-    s->params = params != NULL ? *params : sklyanin_gyrostat_default_params;
-    sklyanin_gyrostat_choose_gauge(&s->params, s->x, s->gauge);
-    return sklyanin_gyrostat_OK;
+    const sklyanin_gyrostat_status status = sklyanin_gyrostat_start(s, params, x0);
+    if (status == sklyanin_gyrostat_OK) sklyanin_gyrostat_choose_gauge(&s->params, s->x, s->gauge);
+    return status;
 }
 
 /* What depends on the step size; nothing where that is as before. */
@@ -2690,14 +2703,15 @@ sklyanin_gyrostat_status sklyanin_gyrostat_ensemble(const sklyanin_gyrostat_para
                                                     size_t members, double h, size_t steps,
                                                     unsigned char *status)
 {
-    sklyanin_gyrostat_status worst = sklyanin_gyrostat_OK;
+    sklyanin_gyrostat_status worst = isfinite(h) ? sklyanin_gyrostat_OK : sklyanin_gyrostat_BAD_ARGUMENT;
+    const sklyanin_gyrostat_params own = params != NULL ? *params : sklyanin_gyrostat_default_params;
     size_t earliest = members;
     if (x == NULL && members > 0) return sklyanin_gyrostat_BAD_ARGUMENT;
 #ifdef _OPENMP
 #pragma omp parallel for schedule(dynamic)
 #endif
     for (size_t first = 0; first < members; first += sklyanin_gyrostat_LANES) {
-        const sklyanin_gyrostat_status group = sklyanin_gyrostat_group_run(params, x, members, first, h, steps, status);
+        const sklyanin_gyrostat_status group = sklyanin_gyrostat_group_run(&own, x, members, first, h, steps, status);
         if (group == sklyanin_gyrostat_OK) continue;
 #ifdef _OPENMP
 #pragma omp critical
@@ -2726,7 +2740,8 @@ static void sklyanin_gyrostat_energy(const sklyanin_gyrostat_params *params, con
 }
 
 /* the Casimirs */
-void sklyanin_gyrostat_casimirs(const sklyanin_gyrostat_params *params, const double x[4], double out[])
+static void sklyanin_gyrostat_casimir_values(const sklyanin_gyrostat_params *params, const double x[4],
+                                             double out[restrict 2])
 {
     (void)params;
     const double S0 = x[0];
@@ -2741,7 +2756,8 @@ void sklyanin_gyrostat_casimirs(const sklyanin_gyrostat_params *params, const do
 }
 
 /* pi(x) grad H(x) */
-void sklyanin_gyrostat_vector_field(const sklyanin_gyrostat_params *params, const double x[4], double out[4])
+static void sklyanin_gyrostat_field(const sklyanin_gyrostat_params *params, const double x[4],
+                                    double out[restrict 4])
 {
     (void)params;
     const double S0 = x[0];
@@ -2766,6 +2782,20 @@ double sklyanin_gyrostat_hamiltonian(const sklyanin_gyrostat_params *params, con
     return energy[0];
 }
 
+void sklyanin_gyrostat_casimirs(const sklyanin_gyrostat_params *params, const double x[4], double out[])
+{
+    double value[2]; /* out may overlap x */
+    sklyanin_gyrostat_casimir_values(params != NULL ? params : &sklyanin_gyrostat_default_params, x, value);
+    for (int i = 0; i < 2; ++i) out[i] = value[i];
+}
+
+void sklyanin_gyrostat_vector_field(const sklyanin_gyrostat_params *params, const double x[4], double out[4])
+{
+    double value[4];
+    sklyanin_gyrostat_field(params != NULL ? params : &sklyanin_gyrostat_default_params, x, value);
+    memcpy(out, value, sizeof value);
+}
+
 const char *sklyanin_gyrostat_status_string(sklyanin_gyrostat_status status)
 {
     switch (status) {
@@ -2773,7 +2803,7 @@ const char *sklyanin_gyrostat_status_string(sklyanin_gyrostat_status status)
     case sklyanin_gyrostat_NO_CONVERGENCE: return "no convergence: the step is too large";
     case sklyanin_gyrostat_SINGULAR: return "singular Newton matrix: the step is too large";
     case sklyanin_gyrostat_NOT_FINITE: return "not finite: overflow, or outside the domain";
-    case sklyanin_gyrostat_BAD_ARGUMENT: return "bad argument: a null pointer, or a value that is not finite";
+    case sklyanin_gyrostat_BAD_ARGUMENT: return "bad argument: a null pointer, or values that are not allowed";
     }
     return "unknown status";
 }

@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 61bd25551b28b78db069a4679462e0607d329a0e3cbee7cd8e68161681fe6fca
+ * body-sha256: 88fb0f2b9e266c38774682f1854241ac11f3af40b46ad6a7dd0b5468f491aac8
  */
 #ifndef SKLYANIN_GYROSTAT_H
 #define SKLYANIN_GYROSTAT_H
@@ -43,7 +43,7 @@ typedef enum {
     sklyanin_gyrostat_NO_CONVERGENCE, /* the inner solve did not converge: the step is too large */
     sklyanin_gyrostat_SINGULAR,       /* the Newton matrix is singular: the step is too large */
     sklyanin_gyrostat_NOT_FINITE,     /* infinity or NaN: overflow, or outside the domain */
-    sklyanin_gyrostat_BAD_ARGUMENT    /* a null pointer, or a value that is not finite */
+    sklyanin_gyrostat_BAD_ARGUMENT    /* a null pointer, a value that is not finite, or parameters that are not allowed */
 } sklyanin_gyrostat_status;
 
 /* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
@@ -81,7 +81,9 @@ typedef struct {
     sklyanin_gyrostat_memory memory[1];
 } sklyanin_gyrostat_solver;
 
-/* Start at x0. params may be NULL for the defaults. */
+/* Start at x0. params may be NULL for the defaults. Arguments of all functions may be parts of the solver, or overlap.
+   sklyanin_gyrostat_BAD_ARGUMENT, and *s as before, if x0 or a parameter is not finite, one that has to be positive is not, or
+   what is computed from parameters alone is not finite. */
 sklyanin_gyrostat_status sklyanin_gyrostat_init(sklyanin_gyrostat_solver *s,
                                                 const sklyanin_gyrostat_params *params, const double x0[4]);
 

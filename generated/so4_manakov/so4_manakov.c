@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 5ef55328810f4e4beccd457c3d45795516853da258612668a2b1c968766c3a96
+ * body-sha256: 1932f14c045df3cff68fb3013e0933a035aea1dda7d107f12f4e03a00095a4bd
  */
 #include "so4_manakov.h"
 
@@ -1025,6 +1025,21 @@ static so4_manakov_status so4_manakov_stages(so4_manakov_solver *s)
     return so4_manakov_OK;
 }
 
+/* All of so4_manakov_init but the gauge. The arguments may be parts of *s: they are read before it is written. */
+static so4_manakov_status so4_manakov_start(so4_manakov_solver *s, const so4_manakov_params *params, const double x0[6])
+{
+    if (s == NULL || x0 == NULL) return so4_manakov_BAD_ARGUMENT;
+    const so4_manakov_params own = params != NULL ? *params : so4_manakov_default_params;
+    double x[6];
+    memcpy(x, x0, sizeof x);
+    for (int i = 0; i < 6; ++i)
+        if (!isfinite(x[i])) return so4_manakov_BAD_ARGUMENT;
+    memset(s, 0, sizeof *s);
+    memcpy(s->x, x, sizeof s->x);
+    s->params = own;
+    return so4_manakov_OK;
+}
+
 /* the leading error vector pi grad S_3, as a function of the gauge */
 static void so4_manakov_guide(const so4_manakov_params *params, const double gauge[1], const double x[6],
                               double error[restrict 6])
@@ -1200,24 +1215,22 @@ static void so4_manakov_choose_gauge(const so4_manakov_params *params, const dou
 so4_manakov_status so4_manakov_init_gauge(so4_manakov_solver *s, const so4_manakov_params *params,
                                           const double x0[6], const double gauge[1])
 {
-    for (int c = 0; gauge != NULL && c < 1; ++c)
-        if (!isfinite(gauge[c])) return so4_manakov_BAD_ARGUMENT;
-    const so4_manakov_status status = so4_manakov_init(s, params, x0);
-    if (status == so4_manakov_OK && gauge != NULL) memcpy(s->gauge, gauge, sizeof s->gauge);
+    double own[1];
+    if (gauge == NULL) return so4_manakov_init(s, params, x0);
+    memcpy(own, gauge, sizeof own);
+    for (int c = 0; c < 1; ++c)
+        if (!isfinite(own[c])) return so4_manakov_BAD_ARGUMENT;
+    const so4_manakov_status status = so4_manakov_start(s, params, x0);
+    if (status == so4_manakov_OK) memcpy(s->gauge, own, sizeof s->gauge);
     return status;
 }
 
 so4_manakov_status so4_manakov_init(so4_manakov_solver *s, const so4_manakov_params *params,
                                     const double x0[6])
 {
-    if (s == NULL || x0 == NULL) return so4_manakov_BAD_ARGUMENT;
-    for (int i = 0; i < 6; ++i)
-        if (!isfinite(x0[i])) return so4_manakov_BAD_ARGUMENT;
-    memset(s, 0, sizeof *s);
-    memcpy(s->x, x0, sizeof s->x);
-    s->params = params != NULL ? *params : so4_manakov_default_params;
-    so4_manakov_choose_gauge(&s->params, s->x, s->gauge);
-    return so4_manakov_OK;
+    const so4_manakov_status status = so4_manakov_start(s, params, x0);
+    if (status == so4_manakov_OK) so4_manakov_choose_gauge(&s->params, s->x, s->gauge);
+    return status;
 }
 
 /* What depends on the step size; nothing where that is as before. */
@@ -2648,14 +2661,15 @@ static so4_manakov_status so4_manakov_group_run(const so4_manakov_params *params
 so4_manakov_status so4_manakov_ensemble(const so4_manakov_params *params, double *x, size_t members, double h,
                                         size_t steps, unsigned char *status)
 {
-    so4_manakov_status worst = so4_manakov_OK;
+    so4_manakov_status worst = isfinite(h) ? so4_manakov_OK : so4_manakov_BAD_ARGUMENT;
+    const so4_manakov_params own = params != NULL ? *params : so4_manakov_default_params;
     size_t earliest = members;
     if (x == NULL && members > 0) return so4_manakov_BAD_ARGUMENT;
 #ifdef _OPENMP
 #pragma omp parallel for schedule(dynamic)
 #endif
     for (size_t first = 0; first < members; first += so4_manakov_LANES) {
-        const so4_manakov_status group = so4_manakov_group_run(params, x, members, first, h, steps, status);
+        const so4_manakov_status group = so4_manakov_group_run(&own, x, members, first, h, steps, status);
         if (group == so4_manakov_OK) continue;
 #ifdef _OPENMP
 #pragma omp critical
@@ -2687,7 +2701,8 @@ static void so4_manakov_energy(const so4_manakov_params *params, const double x[
 }
 
 /* the Casimirs */
-void so4_manakov_casimirs(const so4_manakov_params *params, const double x[6], double out[])
+static void so4_manakov_casimir_values(const so4_manakov_params *params, const double x[6],
+                                       double out[restrict 2])
 {
     (void)params;
     const double x12 = x[0];
@@ -2701,7 +2716,7 @@ void so4_manakov_casimirs(const so4_manakov_params *params, const double x[6], d
 }
 
 /* pi(x) grad H(x) */
-void so4_manakov_vector_field(const so4_manakov_params *params, const double x[6], double out[6])
+static void so4_manakov_field(const so4_manakov_params *params, const double x[6], double out[restrict 6])
 {
     (void)params;
     const double x12 = x[0];
@@ -2737,6 +2752,20 @@ double so4_manakov_hamiltonian(const so4_manakov_params *params, const double x[
     return energy[0];
 }
 
+void so4_manakov_casimirs(const so4_manakov_params *params, const double x[6], double out[])
+{
+    double value[2]; /* out may overlap x */
+    so4_manakov_casimir_values(params != NULL ? params : &so4_manakov_default_params, x, value);
+    for (int i = 0; i < 2; ++i) out[i] = value[i];
+}
+
+void so4_manakov_vector_field(const so4_manakov_params *params, const double x[6], double out[6])
+{
+    double value[6];
+    so4_manakov_field(params != NULL ? params : &so4_manakov_default_params, x, value);
+    memcpy(out, value, sizeof value);
+}
+
 const char *so4_manakov_status_string(so4_manakov_status status)
 {
     switch (status) {
@@ -2744,7 +2773,7 @@ const char *so4_manakov_status_string(so4_manakov_status status)
     case so4_manakov_NO_CONVERGENCE: return "no convergence: the step is too large";
     case so4_manakov_SINGULAR: return "singular Newton matrix: the step is too large";
     case so4_manakov_NOT_FINITE: return "not finite: overflow, or outside the domain";
-    case so4_manakov_BAD_ARGUMENT: return "bad argument: a null pointer, or a value that is not finite";
+    case so4_manakov_BAD_ARGUMENT: return "bad argument: a null pointer, or values that are not allowed";
     }
     return "unknown status";
 }

@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 6061222f39b8af782cce63571a87d6faf4f7fc099267e4cbfa317e0a9f19446a
+ * body-sha256: 0f803693ac20513b21680eef55378dd7e043d51bef5eae2ac76879b7a1626e4a
  */
 #ifndef SO4_MANAKOV_H
 #define SO4_MANAKOV_H
@@ -43,7 +43,7 @@ typedef enum {
     so4_manakov_NO_CONVERGENCE, /* the inner solve did not converge: the step is too large */
     so4_manakov_SINGULAR,       /* the Newton matrix is singular: the step is too large */
     so4_manakov_NOT_FINITE,     /* infinity or NaN: overflow, or outside the domain */
-    so4_manakov_BAD_ARGUMENT    /* a null pointer, or a value that is not finite */
+    so4_manakov_BAD_ARGUMENT    /* a null pointer, a value that is not finite, or parameters that are not allowed */
 } so4_manakov_status;
 
 /* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
@@ -81,7 +81,9 @@ typedef struct {
     so4_manakov_memory memory[1];
 } so4_manakov_solver;
 
-/* Start at x0. params may be NULL for the defaults. */
+/* Start at x0. params may be NULL for the defaults. Arguments of all functions may be parts of the solver, or overlap.
+   so4_manakov_BAD_ARGUMENT, and *s as before, if x0 or a parameter is not finite, one that has to be positive is not, or
+   what is computed from parameters alone is not finite. */
 so4_manakov_status so4_manakov_init(so4_manakov_solver *s, const so4_manakov_params *params,
                                     const double x0[6]);
 

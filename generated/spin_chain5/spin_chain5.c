@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 68eb1f295b5a2b843893cf3ae02deb8bdb7aa80796212788b95ab532a7660ce7
+ * body-sha256: 4af048f73f4c4e421c9a9010b676985f504e12a679cef91a69c6c94ed14795e4
  */
 #include "spin_chain5.h"
 
@@ -2003,6 +2003,35 @@ static spin_chain5_status spin_chain5_stages(spin_chain5_solver *s)
     return spin_chain5_OK;
 }
 
+/* Whether steps can be made with these parameters: finite, positive where the spec says so, and with finite
+   coefficients for a step so short that it has no part in it. */
+static int spin_chain5_admissible(const spin_chain5_params *params)
+{
+    double coef[33];
+    const double gauge[5] = { 0.0 };
+    if (!(isfinite(params->J))) return 0;
+    spin_chain5_prepare(params, gauge, 1e-100, coef);
+    for (int k = 0; k < 33; ++k)
+        if (!isfinite(coef[k])) return 0;
+    return 1;
+}
+
+/* All of spin_chain5_init but the gauge. The arguments may be parts of *s: they are read before it is written. */
+static spin_chain5_status spin_chain5_start(spin_chain5_solver *s, const spin_chain5_params *params, const double x0[15])
+{
+    if (s == NULL || x0 == NULL) return spin_chain5_BAD_ARGUMENT;
+    const spin_chain5_params own = params != NULL ? *params : spin_chain5_default_params;
+    double x[15];
+    memcpy(x, x0, sizeof x);
+    for (int i = 0; i < 15; ++i)
+        if (!isfinite(x[i])) return spin_chain5_BAD_ARGUMENT;
+    if (!spin_chain5_admissible(&own)) return spin_chain5_BAD_ARGUMENT;
+    memset(s, 0, sizeof *s);
+    memcpy(s->x, x, sizeof s->x);
+    s->params = own;
+    return spin_chain5_OK;
+}
+
 /* the leading error vector pi grad S_3, as a function of the gauge (part 1 of 2) */
 spin_chain5_APART static void spin_chain5_guide_part1(const spin_chain5_params *params, const double gauge[5],
                                                       const double x[15], double error[restrict 15],
@@ -2591,24 +2620,22 @@ static void spin_chain5_choose_gauge(const spin_chain5_params *params, const dou
 spin_chain5_status spin_chain5_init_gauge(spin_chain5_solver *s, const spin_chain5_params *params,
                                           const double x0[15], const double gauge[5])
 {
-    for (int c = 0; gauge != NULL && c < 5; ++c)
-        if (!isfinite(gauge[c])) return spin_chain5_BAD_ARGUMENT;
-    const spin_chain5_status status = spin_chain5_init(s, params, x0);
-    if (status == spin_chain5_OK && gauge != NULL) memcpy(s->gauge, gauge, sizeof s->gauge);
+    double own[5];
+    if (gauge == NULL) return spin_chain5_init(s, params, x0);
+    memcpy(own, gauge, sizeof own);
+    for (int c = 0; c < 5; ++c)
+        if (!isfinite(own[c])) return spin_chain5_BAD_ARGUMENT;
+    const spin_chain5_status status = spin_chain5_start(s, params, x0);
+    if (status == spin_chain5_OK) memcpy(s->gauge, own, sizeof s->gauge);
     return status;
 }
 
 spin_chain5_status spin_chain5_init(spin_chain5_solver *s, const spin_chain5_params *params,
                                     const double x0[15])
 {
-    if (s == NULL || x0 == NULL) return spin_chain5_BAD_ARGUMENT;
-    for (int i = 0; i < 15; ++i)
-        if (!isfinite(x0[i])) return spin_chain5_BAD_ARGUMENT;
-    memset(s, 0, sizeof *s);
-    memcpy(s->x, x0, sizeof s->x);
-    s->params = params != NULL ? *params : spin_chain5_default_params;
-    spin_chain5_choose_gauge(&s->params, s->x, s->gauge);
-    return spin_chain5_OK;
+    const spin_chain5_status status = spin_chain5_start(s, params, x0);
+    if (status == spin_chain5_OK) spin_chain5_choose_gauge(&s->params, s->x, s->gauge);
+    return status;
 }
 
 /* What depends on the step size; nothing where that is as before. */
@@ -5268,14 +5295,15 @@ static spin_chain5_status spin_chain5_group_run(const spin_chain5_params *params
 spin_chain5_status spin_chain5_ensemble(const spin_chain5_params *params, double *x, size_t members, double h,
                                         size_t steps, unsigned char *status)
 {
-    spin_chain5_status worst = spin_chain5_OK;
+    spin_chain5_status worst = isfinite(h) ? spin_chain5_OK : spin_chain5_BAD_ARGUMENT;
+    const spin_chain5_params own = params != NULL ? *params : spin_chain5_default_params;
     size_t earliest = members;
     if (x == NULL && members > 0) return spin_chain5_BAD_ARGUMENT;
 #ifdef _OPENMP
 #pragma omp parallel for schedule(dynamic)
 #endif
     for (size_t first = 0; first < members; first += spin_chain5_LANES) {
-        const spin_chain5_status group = spin_chain5_group_run(params, x, members, first, h, steps, status);
+        const spin_chain5_status group = spin_chain5_group_run(&own, x, members, first, h, steps, status);
         if (group == spin_chain5_OK) continue;
 #ifdef _OPENMP
 #pragma omp critical
@@ -5316,7 +5344,8 @@ static void spin_chain5_energy(const spin_chain5_params *params, const double x[
 }
 
 /* the Casimirs */
-void spin_chain5_casimirs(const spin_chain5_params *params, const double x[15], double out[])
+static void spin_chain5_casimir_values(const spin_chain5_params *params, const double x[15],
+                                       double out[restrict 5])
 {
     (void)params;
     const double x1 = x[0];
@@ -5342,9 +5371,8 @@ void spin_chain5_casimirs(const spin_chain5_params *params, const double x[15], 
 }
 
 /* pi(x) grad H(x) */
-void spin_chain5_vector_field(const spin_chain5_params *params, const double x[15], double out[15])
+static void spin_chain5_field(const spin_chain5_params *params, const double x[15], double out[restrict 15])
 {
-    if (params == NULL) params = &spin_chain5_default_params;
     const double x1 = x[0];
     const double y1_ = x[1];
     const double z1 = x[2];
@@ -5414,6 +5442,20 @@ double spin_chain5_hamiltonian(const spin_chain5_params *params, const double x[
     return energy[0];
 }
 
+void spin_chain5_casimirs(const spin_chain5_params *params, const double x[15], double out[])
+{
+    double value[5]; /* out may overlap x */
+    spin_chain5_casimir_values(params != NULL ? params : &spin_chain5_default_params, x, value);
+    for (int i = 0; i < 5; ++i) out[i] = value[i];
+}
+
+void spin_chain5_vector_field(const spin_chain5_params *params, const double x[15], double out[15])
+{
+    double value[15];
+    spin_chain5_field(params != NULL ? params : &spin_chain5_default_params, x, value);
+    memcpy(out, value, sizeof value);
+}
+
 const char *spin_chain5_status_string(spin_chain5_status status)
 {
     switch (status) {
@@ -5421,7 +5463,7 @@ const char *spin_chain5_status_string(spin_chain5_status status)
     case spin_chain5_NO_CONVERGENCE: return "no convergence: the step is too large";
     case spin_chain5_SINGULAR: return "singular Newton matrix: the step is too large";
     case spin_chain5_NOT_FINITE: return "not finite: overflow, or outside the domain";
-    case spin_chain5_BAD_ARGUMENT: return "bad argument: a null pointer, or a value that is not finite";
+    case spin_chain5_BAD_ARGUMENT: return "bad argument: a null pointer, or values that are not allowed";
     }
     return "unknown status";
 }

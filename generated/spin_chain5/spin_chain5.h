@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: e508d06c14a27bfda90117ba8da7b89b4acb67ea10dd60ebf9deebff6ba992f2
+ * body-sha256: 1d2335da7e3f28dad901882a54aee5f06ee9d1f946037f5c6b50d821fe11d7e0
  */
 #ifndef SPIN_CHAIN5_H
 #define SPIN_CHAIN5_H
@@ -43,7 +43,7 @@ typedef enum {
     spin_chain5_NO_CONVERGENCE, /* the inner solve did not converge: the step is too large */
     spin_chain5_SINGULAR,       /* the Newton matrix is singular: the step is too large */
     spin_chain5_NOT_FINITE,     /* infinity or NaN: overflow, or outside the domain */
-    spin_chain5_BAD_ARGUMENT    /* a null pointer, or a value that is not finite */
+    spin_chain5_BAD_ARGUMENT    /* a null pointer, a value that is not finite, or parameters that are not allowed */
 } spin_chain5_status;
 
 /* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
@@ -81,7 +81,9 @@ typedef struct {
     spin_chain5_memory memory[1];
 } spin_chain5_solver;
 
-/* Start at x0. params may be NULL for the defaults. */
+/* Start at x0. params may be NULL for the defaults. Arguments of all functions may be parts of the solver, or overlap.
+   spin_chain5_BAD_ARGUMENT, and *s as before, if x0 or a parameter is not finite, one that has to be positive is not, or
+   what is computed from parameters alone is not finite. */
 spin_chain5_status spin_chain5_init(spin_chain5_solver *s, const spin_chain5_params *params,
                                     const double x0[15]);
 

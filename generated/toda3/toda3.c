@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 2516e8fe25f6edfc1dbedd5899613bc22cfb4b155549a4acc347fa6725651bab
+ * body-sha256: 8f37c2dfbf18168dc460379d94cdbfcb01ce1d7ee8de7e82996f219b4759e652
  */
 #include "toda3.h"
 
@@ -635,15 +635,24 @@ static toda3_status toda3_stages(toda3_solver *s)
     return toda3_OK;
 }
 
-toda3_status toda3_init(toda3_solver *s, const toda3_params *params, const double x0[5])
+/* All of toda3_init but the gauge. The arguments may be parts of *s: they are read before it is written. */
+static toda3_status toda3_start(toda3_solver *s, const toda3_params *params, const double x0[5])
 {
     if (s == NULL || x0 == NULL) return toda3_BAD_ARGUMENT;
+    const toda3_params own = params != NULL ? *params : toda3_default_params;
+    double x[5];
+    memcpy(x, x0, sizeof x);
     for (int i = 0; i < 5; ++i)
-        if (!isfinite(x0[i])) return toda3_BAD_ARGUMENT;
+        if (!isfinite(x[i])) return toda3_BAD_ARGUMENT;
     memset(s, 0, sizeof *s);
-    memcpy(s->x, x0, sizeof s->x);
-    s->params = params != NULL ? *params : toda3_default_params;
+    memcpy(s->x, x, sizeof s->x);
+    s->params = own;
     return toda3_OK;
+}
+
+toda3_status toda3_init(toda3_solver *s, const toda3_params *params, const double x0[5])
+{
+    return toda3_start(s, params, x0);
 }
 
 /* What depends on the step size; nothing where that is as before. */
@@ -1662,14 +1671,15 @@ static toda3_status toda3_group_run(const toda3_params *params, double *x, size_
 toda3_status toda3_ensemble(const toda3_params *params, double *x, size_t members, double h, size_t steps,
                             unsigned char *status)
 {
-    toda3_status worst = toda3_OK;
+    toda3_status worst = isfinite(h) ? toda3_OK : toda3_BAD_ARGUMENT;
+    const toda3_params own = params != NULL ? *params : toda3_default_params;
     size_t earliest = members;
     if (x == NULL && members > 0) return toda3_BAD_ARGUMENT;
 #ifdef _OPENMP
 #pragma omp parallel for schedule(dynamic)
 #endif
     for (size_t first = 0; first < members; first += toda3_LANES) {
-        const toda3_status group = toda3_group_run(params, x, members, first, h, steps, status);
+        const toda3_status group = toda3_group_run(&own, x, members, first, h, steps, status);
         if (group == toda3_OK) continue;
 #ifdef _OPENMP
 #pragma omp critical
@@ -1699,7 +1709,7 @@ static void toda3_energy(const toda3_params *params, const double x[5], double e
 }
 
 /* the Casimirs */
-void toda3_casimirs(const toda3_params *params, const double x[5], double out[])
+static void toda3_casimir_values(const toda3_params *params, const double x[5], double out[restrict 1])
 {
     (void)params;
     const double b1 = x[2];
@@ -1709,7 +1719,7 @@ void toda3_casimirs(const toda3_params *params, const double x[5], double out[])
 }
 
 /* pi(x) grad H(x) */
-void toda3_vector_field(const toda3_params *params, const double x[5], double out[5])
+static void toda3_field(const toda3_params *params, const double x[5], double out[restrict 5])
 {
     (void)params;
     const double a1 = x[0];
@@ -1733,6 +1743,20 @@ double toda3_hamiltonian(const toda3_params *params, const double x[5])
     return energy[0];
 }
 
+void toda3_casimirs(const toda3_params *params, const double x[5], double out[])
+{
+    double value[1]; /* out may overlap x */
+    toda3_casimir_values(params != NULL ? params : &toda3_default_params, x, value);
+    for (int i = 0; i < 1; ++i) out[i] = value[i];
+}
+
+void toda3_vector_field(const toda3_params *params, const double x[5], double out[5])
+{
+    double value[5];
+    toda3_field(params != NULL ? params : &toda3_default_params, x, value);
+    memcpy(out, value, sizeof value);
+}
+
 const char *toda3_status_string(toda3_status status)
 {
     switch (status) {
@@ -1740,7 +1764,7 @@ const char *toda3_status_string(toda3_status status)
     case toda3_NO_CONVERGENCE: return "no convergence: the step is too large";
     case toda3_SINGULAR: return "singular Newton matrix: the step is too large";
     case toda3_NOT_FINITE: return "not finite: overflow, or outside the domain";
-    case toda3_BAD_ARGUMENT: return "bad argument: a null pointer, or a value that is not finite";
+    case toda3_BAD_ARGUMENT: return "bad argument: a null pointer, or values that are not allowed";
     }
     return "unknown status";
 }

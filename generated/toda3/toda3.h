@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: e6d19d829ac86242d25311295e8764d2f7c045c1d2a5bf53391e85f7323294cc
+ * body-sha256: 1365237dd8c245ab1451586b6cc528e6fa75b9534c3e2c98a4715cff65b13f0e
  */
 #ifndef TODA3_H
 #define TODA3_H
@@ -42,7 +42,7 @@ typedef enum {
     toda3_NO_CONVERGENCE, /* the inner solve did not converge: the step is too large */
     toda3_SINGULAR,       /* the Newton matrix is singular: the step is too large */
     toda3_NOT_FINITE,     /* infinity or NaN: overflow, or outside the domain */
-    toda3_BAD_ARGUMENT    /* a null pointer, or a value that is not finite */
+    toda3_BAD_ARGUMENT    /* a null pointer, a value that is not finite, or parameters that are not allowed */
 } toda3_status;
 
 /* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
@@ -79,7 +79,9 @@ typedef struct {
     toda3_memory memory[1];
 } toda3_solver;
 
-/* Start at x0. params may be NULL for the defaults. */
+/* Start at x0. params may be NULL for the defaults. Arguments of all functions may be parts of the solver, or overlap.
+   toda3_BAD_ARGUMENT, and *s as before, if x0 or a parameter is not finite, one that has to be positive is not, or
+   what is computed from parameters alone is not finite. */
 toda3_status toda3_init(toda3_solver *s, const toda3_params *params, const double x0[5]);
 
 /* One step of size h, of either sign. On failure the state is as before. */

@@ -12,7 +12,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: f82204e230beebe12d2ed35586782ad0ccd010afe9369e3f5bb1dfbfc7caa3bd
+ * body-sha256: f411831bc662fc13caa2a2191c748b0931fabb59f6142952640ab334818efff0
  */
 #include "toda3_quadratic.h"
 
@@ -600,16 +600,25 @@ static toda3_quadratic_status toda3_quadratic_stages(toda3_quadratic_solver *s)
     return toda3_quadratic_OK;
 }
 
+/* All of toda3_quadratic_init but the gauge. The arguments may be parts of *s: they are read before it is written. */
+static toda3_quadratic_status toda3_quadratic_start(toda3_quadratic_solver *s, const toda3_quadratic_params *params, const double x0[5])
+{
+    if (s == NULL || x0 == NULL) return toda3_quadratic_BAD_ARGUMENT;
+    const toda3_quadratic_params own = params != NULL ? *params : toda3_quadratic_default_params;
+    double x[5];
+    memcpy(x, x0, sizeof x);
+    for (int i = 0; i < 5; ++i)
+        if (!isfinite(x[i])) return toda3_quadratic_BAD_ARGUMENT;
+    memset(s, 0, sizeof *s);
+    memcpy(s->x, x, sizeof s->x);
+    s->params = own;
+    return toda3_quadratic_OK;
+}
+
 toda3_quadratic_status toda3_quadratic_init(toda3_quadratic_solver *s, const toda3_quadratic_params *params,
                                             const double x0[5])
 {
-    if (s == NULL || x0 == NULL) return toda3_quadratic_BAD_ARGUMENT;
-    for (int i = 0; i < 5; ++i)
-        if (!isfinite(x0[i])) return toda3_quadratic_BAD_ARGUMENT;
-    memset(s, 0, sizeof *s);
-    memcpy(s->x, x0, sizeof s->x);
-    s->params = params != NULL ? *params : toda3_quadratic_default_params;
-    return toda3_quadratic_OK;
+    return toda3_quadratic_start(s, params, x0);
 }
 
 /* What depends on the step size; nothing where that is as before. */
@@ -637,23 +646,22 @@ toda3_quadratic_status toda3_quadratic_step(toda3_quadratic_solver *s, double h)
 
 toda3_quadratic_status toda3_quadratic_integrate(toda3_quadratic_solver *s, double h, size_t steps)
 {
-    for (size_t k = 0; k < steps; ++k) {
-        const toda3_quadratic_status status = toda3_quadratic_step(s, h);
-        if (status != toda3_quadratic_OK) return status;
-    }
-    return toda3_quadratic_OK;
+    toda3_quadratic_status status = toda3_quadratic_set_step(s, h);
+    for (size_t k = 0; k < steps && status == toda3_quadratic_OK; ++k) status = toda3_quadratic_step(s, h);
+    return status;
 }
 
 toda3_quadratic_status toda3_quadratic_ensemble(const toda3_quadratic_params *params, double *x,
                                                 size_t members, double h, size_t steps, unsigned char *status)
 {
-    toda3_quadratic_status worst = toda3_quadratic_OK;
+    toda3_quadratic_status worst = isfinite(h) ? toda3_quadratic_OK : toda3_quadratic_BAD_ARGUMENT;
+    const toda3_quadratic_params own = params != NULL ? *params : toda3_quadratic_default_params;
     if (x == NULL && members > 0) return toda3_quadratic_BAD_ARGUMENT;
     for (size_t m = 0; m < members; ++m) {
         toda3_quadratic_solver s;
         double x0[5];
         for (size_t i = 0; i < 5; ++i) x0[i] = x[i * members + m];
-        toda3_quadratic_status member = toda3_quadratic_init(&s, params, x0);
+        toda3_quadratic_status member = toda3_quadratic_init(&s, &own, x0);
         if (member == toda3_quadratic_OK) {
             member = toda3_quadratic_integrate(&s, h, steps);
             for (size_t i = 0; i < 5; ++i) x[i * members + m] = s.x[i];
@@ -676,7 +684,8 @@ static void toda3_quadratic_energy(const toda3_quadratic_params *params, const d
 }
 
 /* the Casimirs */
-void toda3_quadratic_casimirs(const toda3_quadratic_params *params, const double x[5], double out[])
+static void toda3_quadratic_casimir_values(const toda3_quadratic_params *params, const double x[5],
+                                           double out[restrict 1])
 {
     (void)params;
     const double a1 = x[0];
@@ -688,7 +697,8 @@ void toda3_quadratic_casimirs(const toda3_quadratic_params *params, const double
 }
 
 /* pi(x) grad H(x) */
-void toda3_quadratic_vector_field(const toda3_quadratic_params *params, const double x[5], double out[5])
+static void toda3_quadratic_field(const toda3_quadratic_params *params, const double x[5],
+                                  double out[restrict 5])
 {
     (void)params;
     const double a1 = x[0];
@@ -712,6 +722,20 @@ double toda3_quadratic_hamiltonian(const toda3_quadratic_params *params, const d
     return energy[0];
 }
 
+void toda3_quadratic_casimirs(const toda3_quadratic_params *params, const double x[5], double out[])
+{
+    double value[1]; /* out may overlap x */
+    toda3_quadratic_casimir_values(params != NULL ? params : &toda3_quadratic_default_params, x, value);
+    for (int i = 0; i < 1; ++i) out[i] = value[i];
+}
+
+void toda3_quadratic_vector_field(const toda3_quadratic_params *params, const double x[5], double out[5])
+{
+    double value[5];
+    toda3_quadratic_field(params != NULL ? params : &toda3_quadratic_default_params, x, value);
+    memcpy(out, value, sizeof value);
+}
+
 const char *toda3_quadratic_status_string(toda3_quadratic_status status)
 {
     switch (status) {
@@ -719,7 +743,7 @@ const char *toda3_quadratic_status_string(toda3_quadratic_status status)
     case toda3_quadratic_NO_CONVERGENCE: return "no convergence: the step is too large";
     case toda3_quadratic_SINGULAR: return "singular Newton matrix: the step is too large";
     case toda3_quadratic_NOT_FINITE: return "not finite: overflow, or outside the domain";
-    case toda3_quadratic_BAD_ARGUMENT: return "bad argument: a null pointer, or a value that is not finite";
+    case toda3_quadratic_BAD_ARGUMENT: return "bad argument: a null pointer, or values that are not allowed";
     }
     return "unknown status";
 }

@@ -12,7 +12,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 991bcc2648e672346fd7a52ab0cc1ba40a90f1c73749bd888df31ce4e889cca3
+ * body-sha256: b81ae2344a3974f2c3fa5d5f30d7485e847c9ff893ed243acff813e5d10ea0c0
  */
 #ifndef TODA3_QUADRATIC_H
 #define TODA3_QUADRATIC_H
@@ -41,7 +41,7 @@ typedef enum {
     toda3_quadratic_NO_CONVERGENCE, /* the inner solve did not converge: the step is too large */
     toda3_quadratic_SINGULAR,       /* the Newton matrix is singular: the step is too large */
     toda3_quadratic_NOT_FINITE,     /* infinity or NaN: overflow, or outside the domain */
-    toda3_quadratic_BAD_ARGUMENT    /* a null pointer, or a value that is not finite */
+    toda3_quadratic_BAD_ARGUMENT    /* a null pointer, a value that is not finite, or parameters that are not allowed */
 } toda3_quadratic_status;
 
 /* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
@@ -71,7 +71,9 @@ typedef struct {
     toda3_quadratic_memory memory[1];
 } toda3_quadratic_solver;
 
-/* Start at x0. params may be NULL for the defaults. */
+/* Start at x0. params may be NULL for the defaults. Arguments of all functions may be parts of the solver, or overlap.
+   toda3_quadratic_BAD_ARGUMENT, and *s as before, if x0 or a parameter is not finite, one that has to be positive is not, or
+   what is computed from parameters alone is not finite. */
 toda3_quadratic_status toda3_quadratic_init(toda3_quadratic_solver *s, const toda3_quadratic_params *params,
                                             const double x0[5]);
 

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: a6c803fe99e8201cae53a76916581a81bf146f114c56e80e2554bceafa25784a
+ * body-sha256: 51d11632aa187c64d516b60ca2e350f82ee3af178f76ca7018fcc08402bf05b7
  */
 #include "volterra5.h"
 
@@ -545,15 +545,24 @@ static volterra5_status volterra5_stages(volterra5_solver *s)
     return volterra5_OK;
 }
 
-volterra5_status volterra5_init(volterra5_solver *s, const volterra5_params *params, const double x0[5])
+/* All of volterra5_init but the gauge. The arguments may be parts of *s: they are read before it is written. */
+static volterra5_status volterra5_start(volterra5_solver *s, const volterra5_params *params, const double x0[5])
 {
     if (s == NULL || x0 == NULL) return volterra5_BAD_ARGUMENT;
+    const volterra5_params own = params != NULL ? *params : volterra5_default_params;
+    double x[5];
+    memcpy(x, x0, sizeof x);
     for (int i = 0; i < 5; ++i)
-        if (!isfinite(x0[i])) return volterra5_BAD_ARGUMENT;
+        if (!isfinite(x[i])) return volterra5_BAD_ARGUMENT;
     memset(s, 0, sizeof *s);
-    memcpy(s->x, x0, sizeof s->x);
-    s->params = params != NULL ? *params : volterra5_default_params;
+    memcpy(s->x, x, sizeof s->x);
+    s->params = own;
     return volterra5_OK;
+}
+
+volterra5_status volterra5_init(volterra5_solver *s, const volterra5_params *params, const double x0[5])
+{
+    return volterra5_start(s, params, x0);
 }
 
 /* What depends on the step size; nothing where that is as before. */
@@ -1569,14 +1578,15 @@ static volterra5_status volterra5_group_run(const volterra5_params *params, doub
 volterra5_status volterra5_ensemble(const volterra5_params *params, double *x, size_t members, double h,
                                     size_t steps, unsigned char *status)
 {
-    volterra5_status worst = volterra5_OK;
+    volterra5_status worst = isfinite(h) ? volterra5_OK : volterra5_BAD_ARGUMENT;
+    const volterra5_params own = params != NULL ? *params : volterra5_default_params;
     size_t earliest = members;
     if (x == NULL && members > 0) return volterra5_BAD_ARGUMENT;
 #ifdef _OPENMP
 #pragma omp parallel for schedule(dynamic)
 #endif
     for (size_t first = 0; first < members; first += volterra5_LANES) {
-        const volterra5_status group = volterra5_group_run(params, x, members, first, h, steps, status);
+        const volterra5_status group = volterra5_group_run(&own, x, members, first, h, steps, status);
         if (group == volterra5_OK) continue;
 #ifdef _OPENMP
 #pragma omp critical
@@ -1606,7 +1616,7 @@ static void volterra5_energy(const volterra5_params *params, const double x[5], 
 }
 
 /* the Casimirs */
-void volterra5_casimirs(const volterra5_params *params, const double x[5], double out[])
+static void volterra5_casimir_values(const volterra5_params *params, const double x[5], double out[restrict 1])
 {
     (void)params;
     const double v1 = x[0];
@@ -1618,7 +1628,7 @@ void volterra5_casimirs(const volterra5_params *params, const double x[5], doubl
 }
 
 /* pi(x) grad H(x) */
-void volterra5_vector_field(const volterra5_params *params, const double x[5], double out[5])
+static void volterra5_field(const volterra5_params *params, const double x[5], double out[restrict 5])
 {
     (void)params;
     const double v1 = x[0];
@@ -1645,6 +1655,20 @@ double volterra5_hamiltonian(const volterra5_params *params, const double x[5])
     return energy[0];
 }
 
+void volterra5_casimirs(const volterra5_params *params, const double x[5], double out[])
+{
+    double value[1]; /* out may overlap x */
+    volterra5_casimir_values(params != NULL ? params : &volterra5_default_params, x, value);
+    for (int i = 0; i < 1; ++i) out[i] = value[i];
+}
+
+void volterra5_vector_field(const volterra5_params *params, const double x[5], double out[5])
+{
+    double value[5];
+    volterra5_field(params != NULL ? params : &volterra5_default_params, x, value);
+    memcpy(out, value, sizeof value);
+}
+
 const char *volterra5_status_string(volterra5_status status)
 {
     switch (status) {
@@ -1652,7 +1676,7 @@ const char *volterra5_status_string(volterra5_status status)
     case volterra5_NO_CONVERGENCE: return "no convergence: the step is too large";
     case volterra5_SINGULAR: return "singular Newton matrix: the step is too large";
     case volterra5_NOT_FINITE: return "not finite: overflow, or outside the domain";
-    case volterra5_BAD_ARGUMENT: return "bad argument: a null pointer, or a value that is not finite";
+    case volterra5_BAD_ARGUMENT: return "bad argument: a null pointer, or values that are not allowed";
     }
     return "unknown status";
 }

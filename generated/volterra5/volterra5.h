@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 6f44b9f5e4ef5efb6a52206b3f8ab9870a42a4c569a908fa076f5ca3cd5165e9
+ * body-sha256: 3ce4b0fd7ec7519a7ff3359a5a5513d44268d45b247c1b0cba5a5033393dc8ce
  */
 #ifndef VOLTERRA5_H
 #define VOLTERRA5_H
@@ -42,7 +42,7 @@ typedef enum {
     volterra5_NO_CONVERGENCE, /* the inner solve did not converge: the step is too large */
     volterra5_SINGULAR,       /* the Newton matrix is singular: the step is too large */
     volterra5_NOT_FINITE,     /* infinity or NaN: overflow, or outside the domain */
-    volterra5_BAD_ARGUMENT    /* a null pointer, or a value that is not finite */
+    volterra5_BAD_ARGUMENT    /* a null pointer, a value that is not finite, or parameters that are not allowed */
 } volterra5_status;
 
 /* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
@@ -79,7 +79,9 @@ typedef struct {
     volterra5_memory memory[1];
 } volterra5_solver;
 
-/* Start at x0. params may be NULL for the defaults. */
+/* Start at x0. params may be NULL for the defaults. Arguments of all functions may be parts of the solver, or overlap.
+   volterra5_BAD_ARGUMENT, and *s as before, if x0 or a parameter is not finite, one that has to be positive is not, or
+   what is computed from parameters alone is not finite. */
 volterra5_status volterra5_init(volterra5_solver *s, const volterra5_params *params, const double x0[5]);
 
 /* One step of size h, of either sign. On failure the state is as before. */

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 6e5c8af7f5d2808f1dfeed188a77cd46017739da7e723960689a62caad3a1402
+ * body-sha256: 46b52baefeee4d44145fb89b10e5b2f37945ea8fad6252c7b81b23a7b4071c91
  */
 #include "vortices3.h"
 
@@ -1053,15 +1053,24 @@ static vortices3_status vortices3_stages(vortices3_solver *s)
     return vortices3_OK;
 }
 
-vortices3_status vortices3_init(vortices3_solver *s, const vortices3_params *params, const double x0[6])
+/* All of vortices3_init but the gauge. The arguments may be parts of *s: they are read before it is written. */
+static vortices3_status vortices3_start(vortices3_solver *s, const vortices3_params *params, const double x0[6])
 {
     if (s == NULL || x0 == NULL) return vortices3_BAD_ARGUMENT;
+    const vortices3_params own = params != NULL ? *params : vortices3_default_params;
+    double x[6];
+    memcpy(x, x0, sizeof x);
     for (int i = 0; i < 6; ++i)
-        if (!isfinite(x0[i])) return vortices3_BAD_ARGUMENT;
+        if (!isfinite(x[i])) return vortices3_BAD_ARGUMENT;
     memset(s, 0, sizeof *s);
-    memcpy(s->x, x0, sizeof s->x);
-    s->params = params != NULL ? *params : vortices3_default_params;
+    memcpy(s->x, x, sizeof s->x);
+    s->params = own;
     return vortices3_OK;
+}
+
+vortices3_status vortices3_init(vortices3_solver *s, const vortices3_params *params, const double x0[6])
+{
+    return vortices3_start(s, params, x0);
 }
 
 /* What depends on the step size; nothing where that is as before. */
@@ -2622,14 +2631,15 @@ static vortices3_status vortices3_group_run(const vortices3_params *params, doub
 vortices3_status vortices3_ensemble(const vortices3_params *params, double *x, size_t members, double h,
                                     size_t steps, unsigned char *status)
 {
-    vortices3_status worst = vortices3_OK;
+    vortices3_status worst = isfinite(h) ? vortices3_OK : vortices3_BAD_ARGUMENT;
+    const vortices3_params own = params != NULL ? *params : vortices3_default_params;
     size_t earliest = members;
     if (x == NULL && members > 0) return vortices3_BAD_ARGUMENT;
 #ifdef _OPENMP
 #pragma omp parallel for schedule(dynamic)
 #endif
     for (size_t first = 0; first < members; first += vortices3_LANES) {
-        const vortices3_status group = vortices3_group_run(params, x, members, first, h, steps, status);
+        const vortices3_status group = vortices3_group_run(&own, x, members, first, h, steps, status);
         if (group == vortices3_OK) continue;
 #ifdef _OPENMP
 #pragma omp critical
@@ -2667,7 +2677,7 @@ static void vortices3_energy(const vortices3_params *params, const double x[6], 
 }
 
 /* the Casimirs */
-void vortices3_casimirs(const vortices3_params *params, const double x[6], double out[])
+static void vortices3_casimir_values(const vortices3_params *params, const double x[6], double out[restrict 1])
 {
     (void)params;
     (void)x;
@@ -2675,7 +2685,7 @@ void vortices3_casimirs(const vortices3_params *params, const double x[6], doubl
 }
 
 /* pi(x) grad H(x) */
-void vortices3_vector_field(const vortices3_params *params, const double x[6], double out[6])
+static void vortices3_field(const vortices3_params *params, const double x[6], double out[restrict 6])
 {
     (void)params;
     const double x1 = x[0];
@@ -2715,6 +2725,20 @@ double vortices3_hamiltonian(const vortices3_params *params, const double x[6])
     return energy[0];
 }
 
+void vortices3_casimirs(const vortices3_params *params, const double x[6], double out[])
+{
+    double value[1]; /* out may overlap x */
+    vortices3_casimir_values(params != NULL ? params : &vortices3_default_params, x, value);
+    for (int i = 0; i < 0; ++i) out[i] = value[i];
+}
+
+void vortices3_vector_field(const vortices3_params *params, const double x[6], double out[6])
+{
+    double value[6];
+    vortices3_field(params != NULL ? params : &vortices3_default_params, x, value);
+    memcpy(out, value, sizeof value);
+}
+
 const char *vortices3_status_string(vortices3_status status)
 {
     switch (status) {
@@ -2722,7 +2746,7 @@ const char *vortices3_status_string(vortices3_status status)
     case vortices3_NO_CONVERGENCE: return "no convergence: the step is too large";
     case vortices3_SINGULAR: return "singular Newton matrix: the step is too large";
     case vortices3_NOT_FINITE: return "not finite: overflow, or outside the domain";
-    case vortices3_BAD_ARGUMENT: return "bad argument: a null pointer, or a value that is not finite";
+    case vortices3_BAD_ARGUMENT: return "bad argument: a null pointer, or values that are not allowed";
     }
     return "unknown status";
 }

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 29ec430be3487af8917263ee6e51e3cc8d8cd567c39fcd0f4d5802e40c17d27e
+ * body-sha256: 24298608387bfed2cc1adf8174b9403f9e0098130e5a49dfbbbdb1c4219d777e
  */
 #ifndef VORTICES3_H
 #define VORTICES3_H
@@ -42,7 +42,7 @@ typedef enum {
     vortices3_NO_CONVERGENCE, /* the inner solve did not converge: the step is too large */
     vortices3_SINGULAR,       /* the Newton matrix is singular: the step is too large */
     vortices3_NOT_FINITE,     /* infinity or NaN: overflow, or outside the domain */
-    vortices3_BAD_ARGUMENT    /* a null pointer, or a value that is not finite */
+    vortices3_BAD_ARGUMENT    /* a null pointer, a value that is not finite, or parameters that are not allowed */
 } vortices3_status;
 
 /* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
@@ -79,7 +79,9 @@ typedef struct {
     vortices3_memory memory[1];
 } vortices3_solver;
 
-/* Start at x0. params may be NULL for the defaults. */
+/* Start at x0. params may be NULL for the defaults. Arguments of all functions may be parts of the solver, or overlap.
+   vortices3_BAD_ARGUMENT, and *s as before, if x0 or a parameter is not finite, one that has to be positive is not, or
+   what is computed from parameters alone is not finite. */
 vortices3_status vortices3_init(vortices3_solver *s, const vortices3_params *params, const double x0[6]);
 
 /* One step of size h, of either sign. On failure the state is as before. */

@@ -105,7 +105,7 @@ class Recorder:
         try:
             self.session = self.solver.backend.start(initial, self.experiment.parameters)
         except BackendError as error:
-            raise self.solver.failure(error, self.experiment.h, None) from error
+            raise self.solver.failure(error, self.experiment.h, None, self.experiment.parameters) from error
         self._open({})
 
     def resume(self, path: Path) -> None:
@@ -231,7 +231,8 @@ def record(recorder: Recorder, console: Console) -> tuple[StepError | None, bool
                     break
                 recorder.save(CHECKPOINT_SECONDS)
         except BackendError as error:
-            failure = recorder.solver.failure(error, experiment.h, recorder.trajectory(False))
+            trajectory = recorder.trajectory(False)
+            failure = recorder.solver.failure(error, experiment.h, trajectory, experiment.parameters)
             failure.__cause__ = error
         interrupted = stop.requested and failure is None and session.steps < run.steps
         if interrupted:

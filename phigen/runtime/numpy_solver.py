@@ -1,7 +1,7 @@
 """A generated NumPy module, loaded from its source text.
 
-Beside the documented functions, sessions use the parts of ``integrate``: ``_coefficients``, ``_advance`` and, with
-tangents, ``_tangent_stage``.
+Beside the documented functions, sessions use the parts of ``integrate``: ``_values``, ``_admissible``,
+``_coefficients``, ``_advance`` and, with tangents, ``_tangent_stage``.
 """
 
 from __future__ import annotations
@@ -150,6 +150,7 @@ class NumpySolver:
     def start(self, x0: Floats, parameters: Mapping[str, float]) -> NumpySession:
         """See `phigen.runtime.backend.Backend`."""
         x = x0[np.newaxis].copy()
+        self._expect_admissible(x, parameters)
         gauge = self._options.get("gauge")
         if gauge is None and self.module.GAUGE:
             gauge = self.module.gauge(x0, **parameters)
@@ -161,6 +162,7 @@ class NumpySolver:
 
     def ensemble(self, x0: Floats, h: float, steps: int, parameters: Mapping[str, float]) -> Floats:
         """See `phigen.runtime.backend.Backend`. Where members fail, the others go on without them."""
+        self._expect_admissible(x0, parameters)
         x, remaining, gauge = x0.copy(), np.arange(len(x0)), self._gauges(x0, parameters)
         failures: dict[int, str] = {}
         done, first = 0, -1
@@ -181,6 +183,10 @@ class NumpySolver:
             members = tuple(sorted(failures))
             raise BackendError(failures[members[0]], first, x, members)
         return x
+
+    def _expect_admissible(self, x0: Floats, parameters: Mapping[str, float]) -> None:
+        if not self.module._admissible(self.module._values(parameters)):
+            raise BackendError("BAD_ARGUMENT", 0, x0, tuple(range(len(x0))))
 
     def _gauges(self, x0: Floats, parameters: Mapping[str, float]) -> Floats | None:
         """The gauge of each member, None where there is no gauge."""

@@ -10,7 +10,7 @@ from difflib import get_close_matches
 import numpy as np
 from numpy.typing import ArrayLike
 
-from phigen.errors import StepError
+from phigen.errors import ParameterError, StepError
 from phigen.runtime.backend import Backend
 from phigen.runtime.crossings import CrossingFinder, Function, Section
 from phigen.runtime.interface import BackendError, Floats, Interface, MissingExtraError, Progress, row_steps
@@ -29,7 +29,8 @@ class Solver:
 
     Parameters of the system are keyword arguments; where a name clashes with an argument, or to pass many, give
     ``parameters={…}``. What is not given has its default of the spec. Wrong arguments raise `ValueError` or
-    `TypeError`, a step that cannot be made `phigen.StepError`. Safe to use from several threads.
+    `TypeError`, a step that cannot be made `phigen.StepError`, parameters with which no step can be made, such as a
+    zero that something is divided by, `phigen.ParameterError`, which is both. Safe to use from several threads.
     """
 
     def __init__(self, backend: Backend, interface: Interface) -> None:
@@ -78,7 +79,7 @@ class Solver:
             states = rows_along(self.backend.start(start, values), h, steps, stride, progress)
         except BackendError as error:
             trajectory = self._trajectory(error.states, row_steps(error.step, stride), h, values)
-            raise self.failure(error, h, trajectory) from error
+            raise self.failure(error, h, trajectory, values) from error
         return self._trajectory(states, row_steps(steps, stride), h, values)
 
     def step(self, x: ArrayLike, h: float, *, parameters: Mapping[str, float] | None = None, **more: float) -> Floats:
@@ -89,7 +90,7 @@ class Solver:
         try:
             session.advance(h, 1)
         except BackendError as error:
-            raise self.failure(error, h, None) from error
+            raise self.failure(error, h, None, values) from error
         return session.state()
 
     def step_tangent(
@@ -103,7 +104,7 @@ class Solver:
         values = self._parameters(parameters, more)
         start, h = self._state(x, "x"), _step_size(h)
         session = self._started(start, h, values)
-        tangent = self._with_tangent(session, h)
+        tangent = self._with_tangent(session, h, values)
         return session.state(), tangent
 
     def tangents(
@@ -117,7 +118,7 @@ class Solver:
         start, h, steps = self._state(x0, "x0"), _step_size(h), _count(steps, "steps", 0)
         session = self._started(start, h, values)
         for _ in range(steps):
-            tangent = self._with_tangent(session, h)
+            tangent = self._with_tangent(session, h, values)
             yield session.state(), tangent
 
     def section(
@@ -148,7 +149,7 @@ class Solver:
                 if progress:
                     progress(session.steps)
         except BackendError as error:
-            raise self.failure(error, h, self._section(found)) from error
+            raise self.failure(error, h, self._section(found), values) from error
         return self._section(found)
 
     def ensemble(
@@ -164,7 +165,7 @@ class Solver:
         try:
             return self.backend.ensemble(start, h, steps, values)
         except BackendError as error:
-            raise self.failure(error, h, error.states) from error
+            raise self.failure(error, h, error.states, values) from error
 
     def hamiltonian(self, x: ArrayLike, *, parameters: Mapping[str, float] | None = None, **more: float) -> Floats:
         """H of the states ``x`` (…, DIM), shape (…)."""
@@ -204,23 +205,35 @@ class Solver:
         try:
             return self.backend.start(start, values)
         except BackendError as error:
-            raise self.failure(error, h, None) from error
+            raise self.failure(error, h, None, values) from error
 
-    def _with_tangent(self, session: Session, h: float) -> Floats:
+    def _with_tangent(self, session: Session, h: float, values: Mapping[str, float]) -> Floats:
         try:
             return session.advance_tangent(h)
         except MissingExtraError:
             hint = "compile it with tangent=True, or say tangent: true in the spec"
             raise TypeError(f"{self.interface.name} was compiled without step_tangent; {hint}") from None
         except BackendError as error:
-            raise self.failure(error, h, None) from error
+            raise self.failure(error, h, None, values) from error
 
     def _section(self, found: Sequence[tuple[float, Floats]]) -> Section:
         t, x = np.array([t for t, _ in found]), np.array([x for _, x in found])
         return Section(t, x.reshape(-1, self.interface.dimension), self.coordinates)
 
-    def failure(self, error: BackendError, h: float, trajectory: Trajectory | Section | Floats | None) -> StepError:
+    def failure(
+        self,
+        error: BackendError,
+        h: float,
+        trajectory: Trajectory | Section | Floats | None,
+        parameters: Mapping[str, float],
+    ) -> StepError:
+        """What the user is told of a failure in the back end, with his step, what was computed, and his parameters."""
         name = self.interface.name
+        if error.status == "BAD_ARGUMENT":
+            # The other arguments were checked.
+            given = ", ".join(f"{name} = {value!r}" for name, value in parameters.items())
+            message = f"{name}: no step can be made with {given}: what is computed from parameters alone is not finite"
+            return ParameterError(message, step=0, status=error.status, trajectory=trajectory, members=error.members)
         where = f"{name}: step {error.step} of size {h!r} failed" if error.step >= 0 else f"{name}: a step failed"
         if error.members:
             shown = ", ".join(map(str, error.members[:5])) + (", …" if len(error.members) > 5 else "")

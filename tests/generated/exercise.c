@@ -59,6 +59,83 @@ static void bad_arguments(void)
     EXPECT(F(ensemble)(NULL, NULL, 3, STEP, 1, NULL) == F(BAD_ARGUMENT));
 }
 
+/* Steps of no size at all are refused, however few of them. */
+static void bad_steps(void)
+{
+    const double sizes[] = { nan(""), HUGE_VAL, -HUGE_VAL };
+    for (int k = 0; k < 3; ++k) {
+        F(solver) s;
+        double x[2 * DIM];
+        unsigned char status[2] = { 99, 99 };
+        for (int i = 0; i < DIM; ++i) x[2 * i] = x[2 * i + 1] = start[i];
+        EXPECT(F(init)(&s, NULL, start) == F(OK));
+        EXPECT(F(step)(&s, sizes[k]) == F(BAD_ARGUMENT));
+        EXPECT(F(ensemble)(NULL, x, 0, sizes[k], 0, NULL) == F(BAD_ARGUMENT));
+        for (size_t steps = 0; steps < 40; steps += 13) {
+            EXPECT(F(integrate)(&s, sizes[k], steps) == F(BAD_ARGUMENT));
+            EXPECT(F(integrate)(NULL, STEP, steps) == F(BAD_ARGUMENT));
+            EXPECT(F(ensemble)(NULL, x, 2, sizes[k], steps, status) == F(BAD_ARGUMENT));
+            EXPECT(status[0] == F(BAD_ARGUMENT) && status[1] == F(BAD_ARGUMENT));
+        }
+        same(s.x, start);
+        EXPECT(s.steps == 0);
+        for (int i = 0; i < DIM; ++i) EXPECT(x[2 * i] == start[i] && x[2 * i + 1] == start[i]);
+    }
+}
+
+/* Parameters that are not finite are refused, and what was there stands. */
+static void bad_parameters(void)
+{
+    F(solver) s, before;
+    memset(&s, 42, sizeof s);
+    before = s;
+    enum { COUNT = sizeof(F(params)) / sizeof(double) };
+    for (int k = 0; k < COUNT; ++k) {
+        const double values[] = { nan(""), HUGE_VAL, -HUGE_VAL };
+        for (int v = 0; v < 3; ++v) {
+            union {
+                F(params) params;
+                double value[COUNT + 1];
+            } given = { F(default_params) };
+            given.value[k] = values[v];
+            EXPECT(F(init)(&s, &given.params, start) == F(BAD_ARGUMENT));
+        }
+    }
+    EXPECT(memcmp(&s, &before, sizeof s) == 0);
+}
+
+/* Arguments may be parts of the solver or overlap: what comes out is what comes from separate ones. */
+static void aliases(void)
+{
+    F(solver) s, b;
+    F(params) params = F(default_params);
+    double field[DIM], casimirs[F(CASIMIRS) + 1], both[DIM + F(CASIMIRS) + 1];
+    EXPECT(F(init)(&s, &params, start) == F(OK));
+    b = s;
+    EXPECT(F(init)(&b, &b.params, b.x) == F(OK));
+    EXPECT(memcmp(&b, &s, sizeof s) == 0);
+    memcpy(b.carry, start, sizeof start);
+    EXPECT(F(init)(&b, &params, b.carry) == F(OK));
+    EXPECT(memcmp(&b, &s, sizeof s) == 0);
+    F(vector_field)(&params, start, field);
+    F(casimirs)(&params, start, casimirs);
+    for (int shift = 0; shift < 2; ++shift) {
+        memcpy(both, start, sizeof start);
+        F(vector_field)(&params, both, both + shift * (F(CASIMIRS) > 0));
+        same(both + shift * (F(CASIMIRS) > 0), field);
+        memcpy(both, start, sizeof start);
+        F(casimirs)(&params, both, both + shift);
+        EXPECT(memcmp(both + shift, casimirs, F(CASIMIRS) * sizeof(double)) == 0);
+    }
+    b = s;
+    EXPECT(F(integrate)(&s, STEP, 3) == F(OK));
+    EXPECT(F(ensemble)(&b.params, b.x, 1, STEP, 3, NULL) == F(OK));
+    same(b.x, s.x);
+    F(vector_field)(&b.params, b.x, b.x);
+    F(vector_field)(&s.params, s.x, field);
+    same(b.x, field);
+}
+
 static void steps(void)
 {
     F(solver) s, branch;
@@ -124,6 +201,9 @@ int main(void)
     observables(NULL);
     observables(&F(default_params));
     bad_arguments();
+    bad_steps();
+    bad_parameters();
+    aliases();
     steps();
     huge_steps();
     ensemble();

@@ -1,14 +1,19 @@
 """What cannot be done is reported, and what was there before stands; members and copies are independent."""
 
 import ctypes
+from dataclasses import replace
+from functools import cache
 
 import mpmath
 import numpy as np
 import pytest
-from support import NAMES, SPECIES, TARGETS, PreciseStep, RawC, compile_text, compiled, described, setting, solver
+from support import BODY, NAMES, SPECIES, TARGETS, PreciseStep, RawC, compile_text, compiled, described, setting, solver
 
-from phigen.scheme.steps import Explicit, Path
-from phigen.errors import StepError
+from phigen import spec
+from phigen.compiler import compile_spec
+from phigen.errors import ParameterError, StepError
+from phigen.scheme.steps import Explicit, Newton, Path, Splitting
+from phigen.spec.model import Extras
 
 STATUSES = {"OK": 0, "NO_CONVERGENCE": 1, "SINGULAR": 2, "NOT_FINITE": 3, "BAD_ARGUMENT": 4}
 PAIR = "coordinates: [q, p]\npoisson: {canonical: {q: [q], p: [p]}}\norder: 2\n"
@@ -101,6 +106,86 @@ def test_after_a_step_that_was_too_large_the_run_goes_on(name, factor):
         assert raw.counters[0] == steps
         assert raw.integrate(at.h, 10) == other.integrate(at.h, 10) == 0
         np.testing.assert_allclose(raw.x, other.x, rtol=0, atol=1e-13 * np.max(np.abs(before)))
+
+
+# -- parameters with which there are no steps
+
+POLE = "parameters: {m: {value: 2, description: a mass}, k: {value: 1, positive: true}}\n"
+PAIR_WITH_MASS = PAIR.replace("order: 2", "hamiltonian: p**2/(2*m) + k*q**4/4")
+BODY_WITH_MASS = BODY.replace("x1**2/2", "k*x1**2/m")
+
+#: One spec of each kind of step, with coefficients that are infinite for m = 0, and whose steps need k > 0.
+KINDS = {
+    "newton": f"{POLE}{BODY_WITH_MASS}order: 4\n",
+    "gauged": f"{POLE}{BODY_WITH_MASS}order: 4\ncasimirs: {{C: x1**2 + x2**2 + x3**2}}\n",
+    "explicit": f"{POLE}{PAIR_WITH_MASS}birealisation: canonical-euler\norder: 1\n",
+    "path": f"{POLE}{BODY_WITH_MASS}order: 2\nbirealisation: karasev\n",
+    "splitting": f"{POLE}{PAIR_WITH_MASS}scheme: splitting\norder: 4\n",
+}
+STEPS = {"newton": Newton, "gauged": Newton, "explicit": Explicit, "path": Path, "splitting": Splitting}
+
+
+@cache
+def kind(name):
+    """The compilation of a kind of step, with its tangent map, and with a gauge where that is chosen."""
+    found = spec.loads(f"phigen: 1\nname: t\n{KINDS[name]}")
+    compilation = compile_spec(found if name == "gauged" else replace(found, gauge="none"), extras=Extras(tangent=True))
+    assert isinstance(compilation.program.step, STEPS[name])
+    assert bool(compilation.program.gauge) == (name == "gauged")
+    return compilation
+
+
+REFUSED = ({"m": 0.0}, {"m": np.nan}, {"k": np.inf}, {"k": 0.0}, {"k": -1.0})
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_parameters_that_give_no_steps_are_refused_from_the_start(name):
+    """What was there before stands; the next start is as if nothing had happened."""
+    compilation = kind(name)
+    x0, raw = [0.3, 0.4, 0.5][: compilation.program.dimension], RawC(compilation)
+    assert raw.init(x0) == STATUSES["OK"]
+    before = bits(raw.memory)
+    for changes in REFUSED:
+        assert raw.init(x0, {"m": 2.0, "k": 1.0, **changes}) == STATUSES["BAD_ARGUMENT"]
+        assert bits(raw.memory) == before
+    assert raw.integrate(0.01, 20) == STATUSES["OK"]
+
+
+@pytest.mark.parametrize("name", KINDS)
+@pytest.mark.parametrize("target", TARGETS)
+def test_parameters_that_give_no_steps_are_told_in_python(name, target):
+    solve = solver(kind(name), target)
+    x0 = [0.3, 0.4, 0.5][: len(solve.coordinates)]
+    calls = [
+        lambda **p: solve.integrate(x0, 0.1, 0, **p),
+        lambda **p: solve.step(x0, 0.1, **p),
+        lambda **p: solve.step_tangent(x0, 0.1, **p),
+        lambda **p: solve.ensemble([x0] * 9, 0.1, 3, **p),
+    ]
+    for call in calls:
+        with pytest.raises(ParameterError, match=r"m = 0\.0, .* what is computed from parameters alone is not finite"):
+            call(m=0)
+        call(m=1)
+    assert not np.isfinite(solve.hamiltonian(x0, m=0.0))
+    assert not np.isfinite(solve.vector_field(x0, m=0.0)).all()
+    if target == "numpy":
+        for changes in REFUSED:
+            with pytest.raises(ValueError, match="no step can be made with the parameters"):
+                solve.backend.module.integrate(x0, 0.1, 0, **changes)
+
+
+def test_a_gauge_and_its_solver_may_be_arguments_of_their_own_start():
+    raw, size = RawC(kind("gauged")), ctypes.sizeof(ctypes.c_double)
+    x0, after = [0.3, 0.4, 0.5], 2 * 3 * size + raw.counters.nbytes
+    assert raw.init(x0) == STATUSES["OK"]
+    gauge = raw.memory[after + 2 * size :][:size].view(np.float64)
+    gauge[0] = 0.25
+    params, x, multiples = (raw.memory.ctypes.data + offset for offset in (after, 0, after + 2 * size))
+    arguments = [ctypes.c_void_p(p) for p in (params, x, multiples)]
+    assert raw.call("init_gauge", ctypes.c_int, raw.here, *arguments) == STATUSES["OK"]
+    assert gauge[0] == 0.25
+    assert raw.x.tolist() == x0
+    assert raw.memory[after:][: 2 * size].view(np.float64).tolist() == [2.0, 1.0]
 
 
 # -- changing the step size, copying the solver

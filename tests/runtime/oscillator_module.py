@@ -22,6 +22,10 @@ def _values(parameters):
     return {**DEFAULT_PARAMETERS, **parameters}
 
 
+def _admissible(values):
+    return True
+
+
 def _coefficients(parameters, x, h, gauge):
     omega = parameters["omega"]
     return [np.array([np.cos(omega * h), np.sin(omega * h), omega, parameters["limit"]])]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 from phigen.scheme.kernel import Kernel
@@ -102,6 +103,7 @@ def _values(program: Program) -> dict[str, object]:
         "defaults": ", ".join(repr(float(p.value)) for p in parameters) or "0",
         "max_iterations": inner.max_iterations,
         "tolerance": repr(inner.tolerance),
+        **_admissible_values(program),
         **{f"{key}_signature": "\n".join(lines) for key, lines in _signatures(program).items()},
         "apart": apart(program),
         **lanes.values(program, _memory_values(program)),
@@ -163,9 +165,11 @@ def _memory_lines(program: Program) -> dict[str, object]:
 
 def _gauge_values(program: Program) -> dict[str, object]:
     name, gauge = program.name, program.gauge
+    start = f"{name}_start(s, params, x0);"
     if not gauge:
-        nothing: dict[str, object] = dict.fromkeys(("gauge_members", "gauge_declarations", "gauge_init"), ())
-        return nothing | {"gauges": 0, "products": 0, "prepare_arguments": "&s->params"}
+        nothing: dict[str, object] = dict.fromkeys(("gauge_members", "gauge_declarations"), ())
+        own = {"gauges": 0, "products": 0, "prepare_arguments": "&s->params", "init_body": [f"return {start}"]}
+        return nothing | own
     count = len(gauge.casimirs)
     said = "Start at x0 with a gauge of one's own: the step is an exact Poisson map for each fixed gauge"
     return {
@@ -178,7 +182,26 @@ def _gauge_values(program: Program) -> dict[str, object]:
             *_init_gauge(program, count)[:-1],
             _init_gauge(program, count)[-1] + ";\n",
         ],
-        "gauge_init": [f"{name}_choose_gauge(&s->params, s->x, s->gauge);"],
+        "init_body": [
+            f"const {name}_status status = {start}",
+            f"if (status == {name}_OK) {name}_choose_gauge(&s->params, s->x, s->gauge);",
+            "return status;",
+        ],
+    }
+
+
+def _admissible_values(program: Program) -> dict[str, object]:
+    """What is asked of parameters; without any, nothing."""
+    gauges, member = len(program.gauge.casimirs) if program.gauge else 0, members(program)
+    refuse = f"if (!{program.name}_admissible(&own)) return {program.name}_BAD_ARGUMENT;"
+    return {
+        "refusal": [refuse] if program.parameters else [],
+        "conditions": [
+            f"isfinite(params->{member[p.name]})" + (f" && params->{member[p.name]} > 0.0" if p.positive else "")
+            for p in program.parameters
+        ],
+        "zero_gauge": [f"const double gauge[{gauges}] = {{ 0.0 }};"] if gauges else [],
+        "admissible_arguments": "params, gauge" if gauges else "params",
     }
 
 
@@ -192,12 +215,15 @@ def _signatures(program: Program) -> dict[str, list[str]]:
     """Signatures that are too long for one line with a long name."""
     name, n = program.name, program.dimension
     solver, params, status = f"{name}_solver *s", f"const {name}_params *params", f"{name}_status "
+    state = f"const double x[{n}]"
     many = ["double *x", "size_t members", "double h", "size_t steps", "unsigned char *status"]
     return {
         "init_gauge": _init_gauge(program, len(program.gauge.casimirs) if program.gauge else 0),
         "init": wrapped_arguments(f"{status}{name}_init(", [solver, params, f"const double x0[{n}]"]),
         "ensemble": wrapped_arguments(f"{status}{name}_ensemble(", [params, *many]),
-        "hamiltonian": wrapped_arguments(f"double {name}_hamiltonian(", [params, f"const double x[{n}]"]),
+        "hamiltonian": wrapped_arguments(f"double {name}_hamiltonian(", [params, state]),
+        "casimirs": wrapped_arguments(f"void {name}_casimirs(", [params, state, "double out[]"]),
+        "vector_field": wrapped_arguments(f"void {name}_vector_field(", [params, state, f"double out[{n}]"]),
     }
 
 
@@ -218,9 +244,6 @@ def _body(program: Program) -> str:
 
     def static(kernel: Kernel) -> str:
         return function(program, kernel) + "\n"
-
-    def exported(kernel: Kernel) -> str:
-        return function(program, kernel, exported=True) + "\n"
 
     pieces = [_render("preamble.c", values)]
     pieces += [_render("phi.c", special.values(f, f"{program.name}_{f}")) for f in special.used(program)]
@@ -247,6 +270,9 @@ def _body(program: Program) -> str:
             pieces += [static(step.increment), _render("explicit.c", values)]
     if not isinstance(step, Splitting):
         pieces.append(_render("compose.c", values))
+    if program.parameters:
+        pieces.append(_render("admissible.c", values))
+    pieces.append(_render("start.c", values))
     if program.gauge:
         pieces += [static(program.gauge.guide), static(program.gauge.products)]
         pieces += [_render(f"{template}.c", values) for template in ("gauge", "gauge_line", "choose_gauge")]
@@ -257,7 +283,8 @@ def _body(program: Program) -> str:
     pieces += [_render("api.c", values)]
     pieces += packs.pieces(program, values) if packs.packed(program) else lanes.pieces(program, values)
     seen = program.observables
-    pieces += [static(seen.energy), exported(seen.casimirs), exported(seen.vector_field)]
+    pieces += [static(seen.energy), static(replace(seen.casimirs, name="casimir_values"))]
+    pieces.append(static(replace(seen.vector_field, name="field")))
     if any(apart(program) in piece for piece in pieces):
         pieces.insert(1, _render("apart.c", values))
     return "\n".join([*pieces, _render("observables.c", values)])

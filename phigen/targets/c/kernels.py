@@ -47,7 +47,6 @@ def function(
     program: Program,
     kernel: Kernel,
     *,
-    exported: bool = False,
     lanes: bool = False,
     single: bool = False,
     sparse: bool = False,
@@ -66,7 +65,7 @@ def function(
         functions = lane_calls(program) if lanes else FUNCTIONS
     name = f"{program.name}_{kernel.name}{'_lane' if single else '_lanes' if lanes else ''}"
     plain_arrays = {*shared, "work", *(o.name for o in kernel.outputs)} if single else {*shared}
-    form = Form(name, exported, lanes, functions, frozenset(plain_arrays), single=single, sparse=sparse)
+    form = Form(name, lanes, functions, frozenset(plain_arrays), single=single, sparse=sparse)
     if len(pieces) == 1:
         return _definition(program, kernel, form, pieces[0])
     texts = []
@@ -76,8 +75,6 @@ def function(
     arguments = ", ".join([*kernel.inputs, *(["lane"] if single else []), *(o.name for o in kernel.outputs), "work"])
     lines = [_purpose(program, kernel, form), *_signature(program, kernel, form), "{"]
     lines.append(f"    {form.number(program, 'work')} work[{workspace}];")
-    if exported and "params" in kernel.inputs:
-        lines.append(f"    if (params == NULL) params = &{program.name}_default_params;")
     lines += [f"    {form.name}_part{k}({arguments});" for k in range(1, len(pieces) + 1)]
     return "\n\n".join([*texts, "\n".join([*lines, "}"])])
 
@@ -90,11 +87,10 @@ def lane_calls(program: Program) -> Mapping[str, str]:
 
 @dataclass(frozen=True)
 class Form:
-    """How a kernel is printed: name and linkage; at one point or in lanes; what it calls; which arrays all lanes share;
+    """How a kernel is printed: name; at one point or in lanes; what it calls; which arrays all lanes share;
     whole, or a ``part``; at a ``single`` lane; without zeros if ``sparse``."""
 
     name: str
-    exported: bool = False
     lanes: bool = False
     functions: Mapping[str, str] = field(default_factory=lambda: FUNCTIONS)
     shared: frozenset[str] = frozenset()
@@ -149,16 +145,12 @@ def _signature(program: Program, kernel: Kernel, form: Form) -> list[str]:
         else f"{kinds[i][0]} {i}[{kinds[i][1]}{max(1, len(symbols))}]"
         for i, symbols in kernel.inputs.items()
     ]
-    # restrict: the outputs never overlap the inputs of our own calls; callers of the API get no such duty.
-    qualifier = "" if form.exported else "restrict "
+    # restrict: the outputs never overlap the inputs. All kernels are static; callers of the API get no such duty.
     arguments += ["int lane"] if form.single else []
-    for o in kernel.outputs:
-        # The caller of NAME_casimirs sizes the array by NAME_CASIMIRS, which may be 0.
-        length = "" if form.exported and kernel.name == "casimirs" else f"{qualifier}{max(1, len(o.values))}"
-        arguments.append(f"{form.number(program, o.name)} {o.name}[{length}]")
+    arguments += [f"{form.number(program, o.name)} {o.name}[restrict {max(1, len(o.values))}]" for o in kernel.outputs]
     if form.workspace:
         arguments.append(f"{form.number(program, 'work')} work[restrict {form.workspace}]")
-    kind = "void " if form.exported else f"{apart(program)} static void " if form.workspace else "static void "
+    kind = f"{apart(program)} static void " if form.workspace else "static void "
     return wrapped_arguments(f"{kind}{form.name}(", arguments)
 
 
@@ -208,10 +200,7 @@ def _body(program: Program, kernel: Kernel, form: Form, code: Code) -> list[str]
     unused += [o.name for o in kernel.outputs if o.name not in filled]
     if form.workspace and not any("work[" in line for line in lines):
         unused.append("work")
-    head = [f"    (void){u};" for u in unused]
-    if form.exported and "params" in touched:
-        head.append(f"    if (params == NULL) params = &{program.name}_default_params;")
-    return [*head, *lines]
+    return [*(f"    (void){u};" for u in unused), *lines]
 
 
 def apart(program: Program) -> str:

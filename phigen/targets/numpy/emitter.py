@@ -61,7 +61,7 @@ PATH_SYNTAX = Syntax(
 def emit(program: Program, command: str) -> dict[str, str]:
     """The file name and its contents."""
     seen, gauge = program.observables, program.gauge
-    pieces = [render("numpy", "preamble.py", _values(program))]
+    pieces = [render("numpy", part, _values(program)) for part in ("preamble.py", "parameters.py")]
     pieces += [render("numpy", "phi.py", special.values(f, f"_{f}")) for f in special.used(program)]
     pieces += [render("numpy", "entire.py", special.entire_values(f)) for f in special.entire_used(program)]
     pieces += _step(program)
@@ -150,7 +150,9 @@ def _values(program: Program) -> dict[str, object]:
         "coordinates": _strings(program.coordinates),
         "casimirs": _strings(program.casimirs),
         "defaults": [f'"{p.name}": {float(p.value)!r}' for p in program.parameters],
+        "positive": _strings([p.name for p in program.parameters if p.positive]),
         "gauge": _strings(program.gauge.casimirs if program.gauge else ()),
+        "prepare_arguments": "values, np.zeros((len(GAUGE), 1)), 1e-100" if program.gauge else "values, 1e-100",
         "plausible": repr(PLAUSIBLE),
         "fractions": "(" + "".join(f"{f!r}, " for f in program.fractions).rstrip() + ")",
         "terms": TERMS,
