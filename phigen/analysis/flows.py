@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from phigen.analysis.formulas import readable
 from phigen.compiler import Compilation
 from phigen.scheme.steps import Splitting, Step
 from phigen.splitting.flow import Flow
 from phigen.symbolic.expression import Expression, symbol
+from phigen.symbolic.readable import readable
 
 
 def method(compilation: Compilation) -> str:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from phigen.analysis.formulas import Formula, of_polynomial
 from phigen.analysis.proof import stage_order
 from phigen.compiler import Compilation
 from phigen.errors import Diagnostic, SpecError
 from phigen.scheme.modified import corrections, expect_modified, powers
+from phigen.symbolic.readable import Formula, of_polynomial
 
 #: The leading term of the modified Hamiltonian costs one more coefficient of the series; beyond this it is left out.
 _MODIFIED_UP_TO = 6

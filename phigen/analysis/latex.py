@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from phigen.analysis.flows import images
-from phigen.analysis.formulas import SHOWN, latex, readable_latex
+from phigen.analysis.formulas import formula_latex, latex, readable_latex
 from phigen.analysis.generating import modified_formulas, series_formulas
 from phigen.compiler import Compilation
 from phigen.splitting.flow import Flow
 from phigen.symbolic.expression import symbol
+from phigen.symbolic.readable import SHOWN
 
 #: The function φ of the exponential bi-realisation.
 PHI = ("\\varphi(s)", r"\frac{1}{s} \left( 1 - \frac{\sqrt{s}}{2} \cot \frac{\sqrt{s}}{2} \right)")
@@ -37,7 +38,7 @@ def document(compilation: Compilation, modified: int = 0, most: int | None = SHO
         blocks += [*_maps(compilation, names), _aligned(_series(compilation, most))]
     if listed := modified_formulas(compilation, modified, most):
         sums = " + ".join(["H", *(f"{_power(j)} H_{{{j}}}" for j, _ in listed), "\\cdots"])
-        blocks.append(_aligned([("\\tilde{H}", sums), *((f"H_{{{j}}}", f.latex()) for j, f in listed)]))
+        blocks.append(_aligned([("\\tilde{H}", sums), *((f"H_{{{j}}}", formula_latex(f)) for j, f in listed)]))
     return "\n".join([f"% {compilation.spec.name}, order {compilation.order.order}; needs amsmath", *blocks])
 
 
@@ -73,7 +74,7 @@ def _gauged(compilation: Compilation) -> str:
 def _series(compilation: Compilation, most: int | None) -> list[tuple[str, str]]:
     listed, _ = series_formulas(compilation, most)
     total = " + ".join(f"{_power(i)} S_{{{i}}}" for i, _ in listed)
-    texts = [_gauged(compilation) * (i == 1) + f.latex() for i, f in listed]
+    texts = [_gauged(compilation) * (i == 1) + formula_latex(f) for i, f in listed]
     return [("S_h", total), *zip_names([f"S_{{{i}}}" for i, _ in listed], texts)]
 
 

@@ -15,9 +15,9 @@ from html import escape
 from itertools import pairwise
 from typing import Any
 
-from phigen.analysis.formulas import Formula
 from phigen.symbolic.entire import ENTIRE
 from phigen.symbolic.expression import Expression, fold, natural_key
+from phigen.symbolic.readable import Formula
 
 #: Characters of markup beyond which a part of a formula is left out; what is shared should have a name by then.
 LONGEST = 60_000

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from phigen.analysis.formulas import Formula, expanded
 from phigen.symbolic.expression import Expression, fold, raw, symbol, topological
+from phigen.symbolic.readable import Formula, expanded
 
 #: What has fewer leaves than this gets no name of its own, nor what saves fewer leaves.
 SMALL, WORTH = 3, 4

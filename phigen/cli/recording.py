@@ -12,7 +12,6 @@ import click
 import numpy as np
 
 from phigen._version import __version__
-from phigen.analysis.formulas import readable
 from phigen.analysis.lyapunov import FrameGrowth, Spectrum
 from phigen.analysis.sections import function_of
 from phigen.analysis.sketch import POINTS, Sketch, Thinned
@@ -31,6 +30,7 @@ from phigen.runtime.session import Session
 from phigen.runtime.solver import Solver
 from phigen.runtime.tables import Table, opened
 from phigen.runtime.trajectory import Trajectory, trajectory_columns
+from phigen.symbolic.readable import readable
 
 #: Seconds between two checkpoints.
 CHECKPOINT_SECONDS = 2.0

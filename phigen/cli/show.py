@@ -38,8 +38,8 @@ def command(
     as_json: bool,
 ) -> None:
     """Show the formulas of a spec: π, Casimirs, α, β, S_1 … S_k, the modified Hamiltonian, operation counts."""
-    from phigen.analysis.formulas import SHOWN
     from phigen.api import compilation_of
+    from phigen.symbolic.readable import SHOWN
 
     if as_latex and as_json:
         raise click.UsageError("--latex and --json exclude one another")
@@ -109,7 +109,7 @@ def _width(name: str) -> int:
 
 def brackets(compilation: Compilation) -> list[tuple[str, str]]:
     """The brackets of coordinates that are not 0."""
-    from phigen.analysis.formulas import readable
+    from phigen.symbolic.readable import readable
 
     system = compilation.system
     names, n = system.coordinates, system.dimension
@@ -120,7 +120,7 @@ def brackets(compilation: Compilation) -> list[tuple[str, str]]:
 
 def readable_one(expression: Any, most: int | None) -> str:
     """One expression as text."""
-    from phigen.analysis.formulas import readable
+    from phigen.symbolic.readable import readable
 
     return readable([expression], most)[0]
 
@@ -131,7 +131,7 @@ def _named(formulas: Any, most: int | None) -> list[tuple[str, str]]:
 
 def _maps(compilation: Compilation, most: int | None) -> list[tuple[str, str]]:
     """α and β, of a symmetric pair α alone and what β is; of a path they are series, of which this is the beginning."""
-    from phigen.analysis.formulas import readable
+    from phigen.symbolic.readable import readable
 
     realisation, names = compilation.chart, compilation.system.coordinates
     more = " + …" if realisation.path else ""
@@ -187,7 +187,7 @@ def _files(compilation: Compilation) -> dict[str, str]:
 
 def _described(compilation: Compilation) -> dict[str, object]:
     from phigen.analysis import flows
-    from phigen.analysis.formulas import readable
+    from phigen.symbolic.readable import readable
 
     system, plan = compilation.system, compilation.order
     return {
@@ -208,9 +208,9 @@ def _described(compilation: Compilation) -> dict[str, object]:
 
 
 def _described_series(compilation: Compilation) -> dict[str, object]:
-    from phigen.analysis.formulas import readable
     from phigen.analysis.generating import series_formulas
     from phigen.analysis.proof import stage_order
+    from phigen.symbolic.readable import readable
 
     realisation, plan = compilation.chart, compilation.order
     listed, correction = series_formulas(compilation, None)

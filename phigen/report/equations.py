@@ -8,10 +8,10 @@ from dataclasses import replace
 from markupsafe import Markup
 
 from phigen.analysis import mathml, parts
-from phigen.analysis.formulas import SHOWN, Formula
 from phigen.report import page
 from phigen.scheme.lowering import operation_counts
 from phigen.symbolic.expression import Expression
+from phigen.symbolic.readable import SHOWN, Formula
 
 #: Names and numbers of a group of formulas: beyond the first number it is folded, beyond the second left out.
 FOLDED, LEFT_OUT = 160, 4_000

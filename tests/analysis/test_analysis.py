@@ -9,12 +9,13 @@ from scipy.integrate import DOP853
 from support import series_of
 
 from phigen import resources, spec
-from phigen.analysis import arrays, classical, dop853, formulas, summary
+from phigen.analysis import arrays, classical, dop853, summary
 from phigen.compiler import compile_file
 from phigen.geometry.system import system_from_spec
 from phigen.realisations.catalogue import realise
 from phigen.spec.model import BirealisationChoice
 from phigen.spec.names import SPEC_FUNCTIONS
+from phigen.symbolic import readable
 from phigen.symbolic.expression import FUNCTIONS, PI, call, number, power, symbol, text
 from phigen.symbolic.numeric import evaluate
 
@@ -110,7 +111,7 @@ def test_printed_series_is_the_series(name):
     names = [*compilation.system.coordinates, *compilation.system.parameter_names]
     values = {n: 0.3 + 0.2 * i for i, n in enumerate(names)}
     for s in (series.terms[0], series.terms[2]):
-        shown = str(formulas.of_polynomial(series.tower, s, None))
+        shown = str(readable.of_polynomial(series.tower, s, None))
         functions = {f: getattr(math, f) for f in ("sin", "cos", "exp", "log", "sqrt")}
         (expected,) = evaluate([series.tower.expression(s)], values)
         assert eval(shown, {**functions, **values}) == pytest.approx(expected, rel=1e-12)
@@ -121,7 +122,7 @@ def test_readable_formulas_keep_their_value_and_lose_colons():
     alpha = realise(system, BirealisationChoice("cayley")).alpha
     names = [*system.coordinates, *(f"p_{c}" for c in system.coordinates)]
     values = {n: 0.3 + 0.2 * i for i, n in enumerate(names)}
-    for shown, e in zip(formulas.readable(alpha, None), alpha, strict=True):
+    for shown, e in zip(readable.readable(alpha, None), alpha, strict=True):
         (expected,) = evaluate([e], {n.replace("p_", "p:"): v for n, v in values.items()})
         assert eval(shown, dict(values)) == pytest.approx(expected)
         assert len(shown) <= len(text(e))
@@ -138,8 +139,8 @@ def test_fewer_parentheses_do_not_change_the_value(formula):
     e = spec.loads(f"{head}hamiltonian: {formula}\n").hamiltonian
     values = {"x": 1.3, "y": 0.7, "z": 2.1}
     functions = {"exp": math.exp, "sqrt": math.sqrt}
-    assert eval(formulas._infix(e), {**functions, **values}) == pytest.approx(evaluate([e], values)[0], rel=1e-14)
-    assert "**(-" not in formulas._infix(e)  # denominators are written as such
+    assert eval(readable._infix(e), {**functions, **values}) == pytest.approx(evaluate([e], values)[0], rel=1e-14)
+    assert "**(-" not in readable._infix(e)  # denominators are written as such
 
 
 def test_starter_spec_summary_agrees_with_the_solver():

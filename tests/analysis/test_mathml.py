@@ -10,7 +10,6 @@ from mathml_value import value_of
 
 from phigen import resources, spec
 from phigen.analysis import mathml, parts
-from phigen.analysis.formulas import expanded
 from phigen.geometry.system import system_from_spec
 from phigen.realisations.catalogue import realise
 from phigen.symbolic.expression import (
@@ -30,6 +29,7 @@ from phigen.symbolic.expression import (
     topological,
 )
 from phigen.symbolic.numeric import evaluate
+from phigen.symbolic.readable import expanded
 
 VALUES = {"x": 1.3, "y1": 0.7, "omega_2": 2.1, "prey": 0.4, "p:y1": 0.11, "gauge:C": 0.2, "lambda": 1.9}
 x, y, w, prey, p, lam = (symbol(n) for n in ("x", "y1", "omega_2", "prey", "p:y1", "lambda"))

@@ -1,8 +1,8 @@
-"""Formulas for reading: polynomials term by term, in text and in LaTeX."""
+"""Formulas for reading: polynomials term by term, other expressions with no more parentheses than needed."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from math import lcm
@@ -10,9 +10,7 @@ from math import lcm
 from phigen.symbolic.expression import (
     Expression,
     fold,
-    number,
     power,
-    product,
     substitute,
     symbol,
     symbols_of,
@@ -49,31 +47,24 @@ class Formula:
         return len(self.terms) + self.hidden
 
     def __str__(self) -> str:
-        return self._joined([_monomial(m) for _, m in self.terms], str, " + … ({} terms)", "({})/{}")
-
-    def latex(self) -> str:
-        """The formula in LaTeX."""
-        monomials = [latex(product(power(b, e) for b, e in m)) for _, m in self.terms]
-        dots = r" + \cdots \text{{ ({} terms)}}"
-        return self._joined(monomials, lambda c: latex(number(c)), dots, r"\frac{{1}}{{{1}}} \left( {0} \right)", " ")
-
-    def _joined(
-        self, monomials: list[str], written: Callable[[Fraction], str], dots: str, quotient: str, times: str = "*"
-    ) -> str:
-        if not monomials:
-            return "0"
-        parts: list[str] = []
-        for (coefficient, _), monomial in zip(self.terms, monomials, strict=True):
-            size = abs(coefficient)
-            body = written(size) if monomial == "1" else monomial if size == 1 else written(size) + times + monomial
-            sign = "-" if coefficient < 0 else "+" if parts else ""
-            parts.append(f" {sign} {body}" if parts else f"{sign}{body}")
-        joined = "".join(parts) + (dots.format(self.size) if self.hidden else "")
+        signed = [(c < 0, _term(abs(c), _monomial(m))) for c, m in self.terms]
+        more = f" + … ({self.size} terms)" if self.hidden else ""
+        joined = (signed_sum(signed) if signed else "0") + more
         if self.divisor == 1:
             return joined
-        if len(parts) == 1 and not self.hidden and times == "*":
-            return f"{joined}/{self.divisor}"
-        return quotient.format(joined, self.divisor)
+        return f"{joined}/{self.divisor}" if len(signed) == 1 and not more else f"({joined})/{self.divisor}"
+
+
+def signed_sum(terms: Iterable[tuple[bool, str]]) -> str:
+    """Terms joined by their signs, each given by whether it is negative."""
+    joined = "".join(f" {'-' if negative else '+'} {body}" for negative, body in terms)
+    return joined[3:] if joined.startswith(" + ") else f"-{joined[3:]}"
+
+
+def _term(coefficient: Fraction, monomial: str) -> str:
+    if monomial == "1":
+        return str(coefficient)
+    return monomial if coefficient == 1 else f"{coefficient}*{monomial}"
 
 
 def of_polynomial(tower: Tower, element: Poly, most: int | None = SHOWN) -> Formula:
@@ -94,13 +85,6 @@ def readable(expressions: Sequence[Expression], most: int | None = SHOWN) -> lis
     forms = expanded(shown, most)
     plain = [_written(e) for e in shown]
     return [min((str(f), t), key=len) if f else t for f, t in zip(forms, plain, strict=True)]
-
-
-def readable_latex(expressions: Sequence[Expression]) -> list[str]:
-    """The expressions in LaTeX, expanded where that is shorter."""
-    shown = with_plain_names(expressions)
-    forms = [[latex(e), *([f.latex()] if f else [])] for f, e in zip(expanded(shown, None), shown, strict=True)]
-    return [min(form, key=len) for form in forms]
 
 
 def _written(e: Expression) -> str:
@@ -146,16 +130,6 @@ def _infix(e: Expression) -> str:
         return written, 4 if not node.args and written.isidentifier() else 3 if written.isdigit() else 2
 
     return fold([e], visit)[0][0]
-
-
-def latex(e: Expression) -> str:
-    """One expression in LaTeX, by sympy."""
-    import sympy
-
-    from phigen.geometry.sympy_bridge import to_sympy
-
-    written = str(sympy.latex(to_sympy(e)))
-    return written.replace("κ", r"\kappa").replace("λ", r"\lambda")
 
 
 def with_plain_names(expressions: Sequence[Expression]) -> list[Expression]:
