@@ -21,7 +21,11 @@ from phigen.symbolic.verdict import REFUTED, UNDECIDED, Statement, decide_elemen
 #: Statements by the part of the mathematics they belong to, in the order of the pipeline.
 Groups = Mapping[str, tuple[Statement, ...]]
 
+#: What rests on π: if that is no Poisson tensor, all of it may fail, and says nothing more.
+UNEXAMINED = "Casimirs, invariants, the method"
+
 PREFIX = "bi-realisation: "
+CASIMIRS, INVARIANTS = "Casimirs", "Invariants"
 METHOD, SPLITTING = "Bi-realisation", "Splitting"
 
 #: Where a spec says what a group of statements is about.
@@ -33,13 +37,15 @@ class Examination:
     """What was proved about a spec.
 
     ``compilation`` is None if there is none: ``obstacle`` then says why. An obstacle is no refutation: no
-    bi-realisation of the catalogue may apply to a perfectly good Poisson tensor.
+    bi-realisation of the catalogue may apply to a perfectly good Poisson tensor. ``unexamined`` names what rests on
+    something refuted, and would only repeat that; it is empty if everything was examined.
     """
 
     spec: Spec
     groups: Groups
     compilation: Compilation | None = None
     obstacle: SpecError | None = None
+    unexamined: str = ""
     seconds: Mapping[str, float] = field(default_factory=dict)
 
     @property
@@ -51,6 +57,19 @@ class Examination:
     def refuted(self) -> list[Statement]:
         """The statements that are false."""
         return [s for s in self.statements if s.verdict == REFUTED]
+
+    @property
+    def mistakes(self) -> list[tuple[str, Statement]]:
+        """The statements that are false with their groups, without those that may follow from one before.
+
+        Casimirs and invariants stand for themselves. The axioms of a bi-realisation, and the flows of a splitting, are
+        about the same few formulas: the first that fails says what is wrong.
+        """
+        found = []
+        for group, listed in self.groups.items():
+            refuted = [(group, s) for s in listed if s.verdict == REFUTED]
+            found += refuted if group in (CASIMIRS, INVARIANTS) else refuted[:1]
+        return found
 
 
 def examine(
@@ -71,12 +90,15 @@ def examine(
     except SpecError as error:
         raise located(error, spec) from None
     built = time.perf_counter()
-    groups = _geometry(system)
+    groups = _tensor(system)
+    if any(s.verdict == REFUTED for group in groups.values() for s in group):
+        return Examination(spec, groups, unexamined=UNEXAMINED)
+    groups |= _integrals(system)
     try:
         compilation = compile_spec(spec, order=order, scheme=scheme, system=system, extras=extras)
     except SpecError as error:
         return Examination(spec, groups, obstacle=located(error, spec))
-    groups = {**groups, **_method(compilation)}
+    groups |= _method(compilation)
     compiling = sum(compilation.seconds.values())
     proofs = time.perf_counter() - built - compiling
     seconds = {**compilation.seconds, "system": built - start, "proofs": proofs}
@@ -109,24 +131,26 @@ def refutation(found: Examination) -> str:
     spec = found.spec
     places: dict[str, tuple[str, ...]] = {f"{name} is a Casimir": ("casimirs", name) for name in spec.casimirs}
     places |= {f"{name} is invariant": ("invariants", name) for name in spec.invariants}
+    hint = f"not examined, since they rest on it: {found.unexamined}" if found.unexamined else ""
     lines = []
-    for group, listed in found.groups.items():
-        default = _PLACES.get(group.partition(" (")[0], ("poisson",))
-        refuted = (s for s in listed if s.verdict == REFUTED)
-        lines += [str(spec.diagnostic(places.get(s.name, default), str(s))) for s in refuted]
+    for group, s in found.mistakes:
+        place = places.get(s.name, _PLACES.get(group.partition(" (")[0], ("poisson",)))
+        lines.append(str(spec.diagnostic(place, str(s), hint)))
     return "\n".join(lines)
 
 
-def _geometry(system: System) -> Groups:
-    groups: dict[str, tuple[Statement, ...]] = {
-        "Poisson tensor": (checks.skew_symmetry(system), jacobi_identity(system)),
-        "Casimirs": (*checks.casimir_statements(system), checks.rank_statement(system)),
-    }
+def _tensor(system: System) -> dict[str, tuple[Statement, ...]]:
+    skew = checks.skew_symmetry(system)
+    return {"Poisson tensor": (skew,) if skew.verdict == REFUTED else (skew, jacobi_identity(system))}
+
+
+def _integrals(system: System) -> dict[str, tuple[Statement, ...]]:
+    casimirs = (*checks.casimir_statements(system), checks.rank_statement(system))
     invariants = tuple(checks.invariant_statements(system))
-    return groups | ({"Invariants": invariants} if invariants else {})
+    return {CASIMIRS: casimirs} | ({INVARIANTS: invariants} if invariants else {})
 
 
-def _method(compilation: Compilation) -> Groups:
+def _method(compilation: Compilation) -> dict[str, tuple[Statement, ...]]:
     if compilation.splitting:
         return {SPLITTING: tuple(statements.check(compilation.discretised, compilation.splitting))}
     found = axioms.check(compilation.system, compilation.chart)

@@ -55,9 +55,9 @@ def command(
 def _collect(examination: Examination, collector: Collector, console: Console) -> None:
     counts = Counter(s.verdict for s in examination.statements)
     console.note(f"{examination.spec.file}: " + ", ".join(f"{n} {verdict}" for verdict, n in counts.items()))
-    refuted = [s.name for s in examination.refuted]
-    if refuted:
-        collector.errors.append(CheckError(f"{examination.spec.file}: refuted: {'; '.join(refuted)}"))
+    mistakes = [s.name for _, s in examination.mistakes]
+    if mistakes:
+        collector.errors.append(CheckError(f"{examination.spec.file}: refuted: {'; '.join(mistakes)}"))
     elif examination.obstacle:
         collector.errors.append(examination.obstacle)
 
@@ -69,6 +69,8 @@ def _print(examination: Examination) -> None:
         out(f"  {group}")
         for statement in statements:
             out("\n".join(_lines(statement)))
+    if examination.unexamined:
+        out(f"  Not examined, since they rest on it: {examination.unexamined}")
     out("")
 
 
@@ -95,4 +97,5 @@ def _described(examination: Examination) -> dict[str, object]:
         "refuted": len(examination.refuted),
         "statements": listed,
         "obstacles": obstacle,
+        "unexamined": examination.unexamined,
     }

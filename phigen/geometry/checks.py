@@ -8,6 +8,7 @@ from phigen.geometry.jacobi import jacobi_identity
 from phigen.geometry.rank import ATTEMPTS, POINTS, generic_ranks
 from phigen.geometry.system import System, hamiltonian_vector_field
 from phigen.symbolic.expression import gradient, total
+from phigen.symbolic.readable import shortened
 from phigen.symbolic.verdict import CHECKED, UNDECIDED, Statement, decide_zero
 
 
@@ -35,7 +36,7 @@ def casimir_statements(system: System) -> Iterator[Statement]:
     for name, casimir in system.casimirs.items():
         flow = hamiltonian_vector_field(system.poisson, gradient(casimir, system.coordinates))
         residuals = [(f"{{{c}, {name}}}", f) for c, f in zip(system.coordinates, flow, strict=True)]
-        origin = "" if name in system.declared else f"found: {casimir}"
+        origin = "" if name in system.declared else f"found: {shortened(casimir)}"
         yield decide_zero(f"{name} is a Casimir", residuals, system.positive, origin)
 
 

@@ -10,7 +10,8 @@ from phigen.geometry.field import Field
 from phigen.geometry.lie_algebra import LieAlgebra, Representation, SparseMatrix
 from phigen.geometry.linear import Span, add_multiple
 from phigen.symbolic.expression import ZERO, Expression, total
-from phigen.symbolic.verdict import REFUTED, decide_zero, shortened
+from phigen.symbolic.readable import shortened
+from phigen.symbolic.verdict import REFUTED, decide_zero
 
 Matrix = tuple[tuple[Expression, ...], ...]
 

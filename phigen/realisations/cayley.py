@@ -25,7 +25,7 @@ from phigen.realisations.protocol import PAPER, BiRealisation, covector_symbols,
 from phigen.spec.model import BirealisationChoice
 from phigen.symbolic.expression import ONE, Expression, number, symbol
 from phigen.symbolic.horner import horner
-from phigen.symbolic.verdict import shortened
+from phigen.symbolic.readable import shortened
 
 KIND = "cayley"
 

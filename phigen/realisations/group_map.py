@@ -30,7 +30,8 @@ from phigen.realisations.protocol import (
 )
 from phigen.spec.model import BirealisationChoice
 from phigen.symbolic.expression import ZERO, Expression, derivatives, substitute, symbol, total
-from phigen.symbolic.verdict import decide_zero, shortened
+from phigen.symbolic.readable import shortened
+from phigen.symbolic.verdict import decide_zero
 
 KIND = "group-map"
 

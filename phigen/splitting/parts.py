@@ -12,8 +12,8 @@ from phigen.splitting.flow import Flow, NoFlowError, Term, flow_of, joint_flow
 from phigen.splitting.regrouping import by_blocks, with_companions
 from phigen.splitting.ring import Ring, ring_of
 from phigen.splitting.terms import hamiltonian_terms, terms_of
-from phigen.symbolic.expression import text
 from phigen.symbolic.numeric import DomainError, evaluate
+from phigen.symbolic.readable import shortened
 
 #: How often a companion is taken out of the terms.
 ROUNDS = 3
@@ -99,6 +99,6 @@ def _refusal(system: System, error: NoFlowError | None) -> SpecError:
     place = system.locations.get(("hamiltonian",))
     if error is None:
         return SpecError([Diagnostic("scheme splitting: H has no terms", place)])
-    message = f"scheme splitting: the term {text(error.term.expression)} has no elementary flow: {error.reason}"
+    message = f"scheme splitting: the term {shortened(error.term.expression)} has no elementary flow: {error.reason}"
     hint = "scheme: series takes every H; terms in coordinates that commute with one another always split"
     return SpecError([Diagnostic(message, place, hint)])

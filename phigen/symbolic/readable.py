@@ -22,6 +22,9 @@ from phigen.symbolic.tower import Poly, Tower, rational
 #: Terms of a formula that are shown unless all are asked for.
 SHOWN = 8
 
+#: The longest formula in a message.
+LONGEST = 160
+
 #: Functions of phigen's own that have a name in mathematics.
 _GREEK = {"phi0": "φ", "phi1": "φ'", "phi2": "φ''"}
 
@@ -132,10 +135,25 @@ def _infix(e: Expression) -> str:
     return fold([e], visit)[0][0]
 
 
+def plain_name(name: str) -> str:
+    """The name of a symbol for readers: ``p_x1`` for ``p:x1``, as in specs, λ_C for ``gauge:C``."""
+    return name.rstrip(":").replace("gauge:", "λ_").replace(":", "_")
+
+
 def with_plain_names(expressions: Sequence[Expression]) -> list[Expression]:
-    """The expressions with phigen's own symbols under names for readers: ``p:x1`` as ``p_x1``, ``gauge:C`` as λ_C."""
+    """The expressions with phigen's own symbols under `plain_name`."""
     names = [n for n in symbols_of(*expressions) if ":" in n]
-    return substitute(expressions, {n: symbol(n.rstrip(":").replace("gauge:", "λ_").replace(":", "_")) for n in names})
+    return substitute(expressions, {n: symbol(plain_name(n)) for n in names})
+
+
+def shortened(expression: Expression) -> str:
+    """The expression as text of bounded length, for messages."""
+    return cut(readable([expression])[0])
+
+
+def cut(text: str) -> str:
+    """Text of bounded length, for messages."""
+    return text if len(text) <= LONGEST else text[: LONGEST - 1] + "…"
 
 
 def expanded(expressions: Sequence[Expression], most: int | None) -> Iterator[Formula | None]:

@@ -345,6 +345,33 @@ class Tower:
             element = self._eliminate(element, g)
         return element
 
+    def simplified(self, element: Poly) -> Poly:
+        """The same function with fewer terms, by relations that keep its value: r·f = 1, w² = q, sin² + cos² = 1."""
+        for g in reversed(self.generators):
+            if g.kind == "reciprocal" or (g.kind == "root" and g.inverse):
+                found = self._divided(element, g)
+            elif g.kind in ("sin", "cosh", "cosroot", "sign") or (g.kind == "root" and not self._partner(g)):
+                found = self._eliminate(element, g)
+            else:
+                continue
+            element = found if len(found) < len(element) else element
+        return element
+
+    def _divided(self, element: Poly, g: Generator) -> Poly:
+        """The element with less powers of r, where multiples of f = 1/r, or of f = r^-n, are multiplied by them."""
+        parts, own, base = self._parts(element, g.name), self.variable(g.name), g.arguments[0]
+        for e in range(max(parts, default=0), g.degree - 1, -1):
+            quotient, parts[e] = divmod(parts.get(e, self.zero), base)
+            parts[e - g.degree] = parts.get(e - g.degree, self.zero) + quotient
+        return self.combine(c * own**e for e, c in parts.items())
+
+    def _partner(self, g: Generator) -> Generator | None:
+        """The root 1/w for w, or w for 1/w, if it came before."""
+        for other in self.generators[: self.generators.index(g)]:
+            if other.kind == "root" and other.degree == g.degree and other.arguments == g.arguments:
+                return other
+        return None
+
     def _eliminate(self, element: Poly, g: Generator) -> Poly:
         parts = self._parts(element, g.name)
         if set(parts) <= {0}:
@@ -382,11 +409,10 @@ class Tower:
 
     def _eliminate_root(self, parts: dict[int, Poly], g: Generator) -> Poly:
         base, n, own = g.arguments[0], g.degree, self.variable(g.name)
-        for other in self.generators[: self.generators.index(g)]:
-            if other.kind == "root" and other.degree == n and other.arguments == g.arguments:
-                # w·v = 1: multiplied by a power of the partner, g disappears.
-                top, w = max(parts), self.variable(other.name)
-                return self.combine(c * w ** (top - e) for e, c in parts.items())
+        if other := self._partner(g):
+            # w·v = 1: multiplied by a power of the partner, g disappears.
+            top, w = max(parts), self.variable(other.name)
+            return self.combine(c * w ** (top - e) for e, c in parts.items())
         if not g.inverse:
             return self.combine(c * own ** (e % n) * base ** (e // n) for e, c in parts.items())
         top = max(e // n for e in parts)

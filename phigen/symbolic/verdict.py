@@ -6,8 +6,9 @@ from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
-from phigen.symbolic.expression import Expression, symbols_of, text
+from phigen.symbolic.expression import Expression, symbols_of
 from phigen.symbolic.numeric import DomainError, evaluate_exactly, evaluate_with_scale, is_rational
+from phigen.symbolic.readable import LONGEST, cut, of_polynomial, plain_name
 from phigen.symbolic.tower import Poly, Tower
 
 PROVED = "proved"
@@ -20,7 +21,6 @@ DIGITS = 60
 #: A value below 10**-ZERO_DIGITS of its scale counts as zero; rounding stays 15 digits below that.
 ZERO_DIGITS = 40
 _ATTEMPTS = 64
-_LONGEST = 160
 
 
 @dataclass(frozen=True)
@@ -81,10 +81,11 @@ def decide_elements(
         if isinstance(found, str):
             where = f"{label}, " if label else ""
             more = f"; {len(pending)} parts do not reduce to 0" if len(pending) > 1 else ""
-            return Statement(name, REFUTED, f"{where}at {found}{more}", shortened(expression))
+            residual = of_polynomial(tower, tower.simplified(element))
+            return Statement(name, REFUTED, f"{where}at {found}{more}", cut(str(residual)))
         fewest = min(fewest, found)
     parts = ", ".join(label for label, _ in pending if label)
-    about = f" for {parts}" if parts and len(parts) <= _LONGEST else ""
+    about = f" for {parts}" if parts and len(parts) <= LONGEST else ""
     if fewest == 0:
         return Statement(name, UNDECIDED, f"no proof{about}, and no point of the domain among {_ATTEMPTS} tried")
     return Statement(name, CHECKED, f"{fewest} points, relative tolerance 1e-{ZERO_DIGITS}{about}")
@@ -101,8 +102,8 @@ def _refuting_point(expression: Expression, positive: Collection[str]) -> str | 
         except DomainError:
             continue
         if value:
-            where = ", ".join(f"{n}={v}" for n, v in point.items())
-            return f"{where if len(where) <= _LONGEST else f'point {k}'}: {value}"
+            where = ", ".join(f"{plain_name(n)}={v}" for n, v in point.items())
+            return f"{where if len(where) <= LONGEST else f'point {k}'}: {value}"
         tried += 1
         if tried == POINTS or not names:
             break
@@ -137,12 +138,6 @@ def sample_point(names: Sequence[str], positive: Collection[str], index: int) ->
             value = -value
         point[name] = value / 32 if name.startswith("p:") else value
     return point
-
-
-def shortened(expression: Expression) -> str:
-    """The expression as text of bounded length, for messages."""
-    written = text(expression)
-    return written if len(written) <= _LONGEST else written[: _LONGEST - 1] + "…"
 
 
 def all_hold(statements: Iterable[Statement]) -> bool:

@@ -36,6 +36,24 @@ def test_check_refutes_with_residual_and_goes_on(phigen, write):
     assert "S_2 = 0" in done.stdout  # of the good one
 
 
+def test_one_wrong_bracket_is_one_error_and_not_those_that_follow_from_it(phigen, write):
+    path = write("bad.yaml", f"{NOT_POISSON}casimirs: {{C: x + y**2}}\ninvariants: {{F: x*y}}\n")
+    for done in (phigen("build", path), phigen("check", path)):
+        assert done.exit_code == 5
+        assert done.stderr.count("refuted: ") + done.stderr.count(": refuted (") == 1, done.stderr
+    assert "rest on it: Casimirs, invariants, the method" in done.stdout
+    assert "Casimirs, invariants" in phigen("build", path).stderr
+
+
+def test_wrong_birealisation_is_one_error_in_the_names_of_the_spec(phigen, write):
+    head = "phigen: 1\nname: a\ncoordinates: [x, y]\npoisson: {log_canonical: [[0, 1], [-1, 0]]}\nhamiltonian: x + y\n"
+    maps = "alpha: [x - x*y*p_y/2, y + x*y*p_x/2], beta: [x + x*y*p_y/2, y - x*y*p_x/2]"
+    done = phigen("build", write("a.yaml", f"{head}birealisation: {{kind: custom, {maps}}}\ninvariants: {{F: x}}\n"))
+    assert done.stderr.count(": refuted (") == 2  # the other is that x is invariant
+    assert "p:" not in done.stderr
+    assert "p_x=" in done.stderr
+
+
 def test_check_shows_the_geometry_where_no_birealisation_applies(phigen, write):
     path = write("a.yaml")
     poisson = "poisson: {matrix: [[0, 1 + x**2], [-1 - x**2, 0]]}"

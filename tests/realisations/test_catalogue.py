@@ -69,7 +69,7 @@ def test_custom_maps_of_the_wrong_size_or_with_unknown_symbols_are_refused():
     x = symbol("x")
     with pytest.raises(SpecError, match="alpha has 1 components"):
         realise(s, BirealisationChoice("custom", (x,), (x, x)))
-    with pytest.raises(SpecError, match="beta uses p:z"):
+    with pytest.raises(SpecError, match="beta uses p_z"):
         realise(s, BirealisationChoice("custom", (x, x), (x, symbol("p:z"))))
 
 

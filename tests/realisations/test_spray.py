@@ -455,7 +455,7 @@ def test_sprays_of_the_wrong_size_or_with_unknown_symbols_are_refused():
     s = system("x y", PLANE)
     with pytest.raises(SpecError, match="spray has 1 components for 2 coordinates"):
         realise(s, BirealisationChoice("spray", spray=(ZERO,)))
-    with pytest.raises(SpecError, match="spray uses p:z"):
+    with pytest.raises(SpecError, match="spray uses p_z"):
         realise(s, BirealisationChoice("spray", spray=(ZERO, symbol("p:z") ** 2)))
     with pytest.raises(SpecError, match="unknown spray 'round'"):
         realise(s, BirealisationChoice("spray", spray="round"))

@@ -6,7 +6,7 @@ from fractions import Fraction
 
 import pytest
 
-from phigen.symbolic.expression import PI, call, number, sqrt, symbol
+from phigen.symbolic.expression import PI, call, number, power, sqrt, symbol
 from phigen.symbolic.verdict import CHECKED, PROVED, REFUTED, UNDECIDED, decide_zero, sample_point
 
 x, y, a = symbol("x"), symbol("y"), symbol("a")
@@ -30,6 +30,23 @@ def test_nonzero_residual_is_refuted_with_label_point_and_residual():
     assert statement.detail.startswith("second, at x=")
     assert statement.residual == "x - y"
     assert str(statement).startswith("s: refuted (second, at x=")
+
+
+@pytest.mark.parametrize(
+    ("residual", "shown"),
+    [
+        (call("sin", x) ** 2 * y + call("cos", x) ** 2 * y + y, "2*y"),
+        ((x**3 + x * y**2) * power(x**2 + y**2, Fraction(-3, 2)), "x/sqrt(x**2 + y**2)"),
+        (x * (x + 1) / (x + 2) + 2 * (x + 1) / (x + 2), "x + 1"),
+        (sqrt(x + 1) ** 3 - x * sqrt(x + 1) - y, "-y + sqrt(1 + x)"),
+        (symbol("p:x") * number(Fraction(1, 3)) * (y * a), "a*p_x*y/3"),
+        (symbol("gauge:C") - x, "λ_C - x"),
+    ],
+)
+def test_residual_is_simplified_without_a_change_of_value_and_in_the_names_of_specs(residual, shown):
+    statement = decide_zero("s", [("", residual)])
+    assert statement.residual == shown
+    assert ":" not in statement.detail.partition(": ")[0]
 
 
 def test_identity_beyond_the_ring_is_checked_and_says_how():
