@@ -10,12 +10,12 @@ seconds it took. `Gauged` holds the Hamilton–Jacobi series, which is computed 
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
+from phigen import progress
 from phigen import spec as specs
 from phigen.geometry.system import System, system_from_spec
 from phigen.realisations.catalogue import realise
@@ -98,7 +98,7 @@ def compile_spec(
     does not split, …) and `LimitError` (the program would be too large).
     """
     clock = _Clock()
-    source = clock.timed("system", lambda: system or system_from_spec(spec))
+    source = system or clock.timed("system", lambda: system_from_spec(spec))
     extras = extras or spec.extras
     described: dict[str, Any] = {
         "title": spec.title,
@@ -144,9 +144,9 @@ class _Clock:
 
     def timed(self, stage: str, work: Callable[[], T]) -> T:
         """The result of a stage."""
-        start = time.perf_counter()
-        result = work()
-        self.seconds[stage] = time.perf_counter() - start
+        with progress.stage(stage) as running:
+            result = work()
+        self.seconds[stage] = running.seconds
         return result
 
 

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
+from phigen import progress
 from phigen.compiler import Compilation, compile_spec
 from phigen.errors import CheckError, Diagnostic, LimitError, SpecError
 from phigen.geometry import checks
@@ -84,24 +84,25 @@ def examine(
 
     Raises `SpecError` if the spec does not even define a system.
     """
-    start = time.perf_counter()
-    try:
-        system = system or system_from_spec(spec)
-    except SpecError as error:
-        raise located(error, spec) from None
-    built = time.perf_counter()
-    groups = _tensor(system)
-    if any(s.verdict == REFUTED for group in groups.values() for s in group):
-        return Examination(spec, groups, unexamined=UNEXAMINED)
-    groups |= _integrals(system)
-    try:
-        compilation = compile_spec(spec, order=order, scheme=scheme, system=system, extras=extras)
-    except SpecError as error:
-        return Examination(spec, groups, obstacle=located(error, spec))
-    groups |= _method(compilation)
-    compiling = sum(compilation.seconds.values())
-    proofs = time.perf_counter() - built - compiling
-    seconds = {**compilation.seconds, "system": built - start, "proofs": proofs}
+    with progress.stage(spec.name) as whole:
+        try:
+            with progress.stage("system") as building:
+                system = system or system_from_spec(spec)
+        except SpecError as error:
+            raise located(error, spec) from None
+        with progress.stage("proofs"):
+            groups = _tensor(system)
+            if any(s.verdict == REFUTED for group in groups.values() for s in group):
+                return Examination(spec, groups, unexamined=UNEXAMINED)
+            groups |= _integrals(system)
+        try:
+            compilation = compile_spec(spec, order=order, scheme=scheme, system=system, extras=extras)
+        except SpecError as error:
+            return Examination(spec, groups, obstacle=located(error, spec))
+        with progress.stage("proofs"):
+            groups |= _method(compilation)
+    seconds = {**compilation.seconds, "system": building.seconds}
+    seconds["proofs"] = whole.seconds - sum(seconds.values())
     return Examination(spec, groups, compilation, seconds=seconds)
 
 

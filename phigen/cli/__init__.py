@@ -85,11 +85,13 @@ class Commands(click.Group):
         return code
 
     def invoke(self, ctx: click.Context) -> Any:
+        console = ctx.ensure_object(Console)
         try:
-            return super().invoke(ctx)
+            with console.watching():
+                return super().invoke(ctx)
         except BrokenPipeError as error:
             # Not left to click, which would exit with 1, the code of a wrong spec.
-            return failures.report(error, ctx.ensure_object(Console))
+            return failures.report(error, console)
 
 
 @click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})

@@ -5,11 +5,13 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
 import click
+
+from phigen.cli.display import Display
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -21,24 +23,35 @@ class Console:
     quiet: bool = False
     verbose: bool = False
 
+    def __post_init__(self) -> None:
+        self._display = Display(lambda: not self.quiet and sys.stderr.isatty(), self.detail)
+
+    def _say(self, message: str) -> None:
+        self._display.erase()
+        click.echo(message, err=True, color=_colour())
+
     def error(self, message: str) -> None:
         """A message about what failed; never silenced."""
-        click.echo(_coloured(message), err=True, color=_colour())
+        self._say(_coloured(message))
 
     def warn(self, message: str) -> None:
         """Something the user should know, although the work goes on."""
         if not self.quiet:
-            click.echo(_coloured(f"warning: {message}"), err=True, color=_colour())
+            self._say(_coloured(f"warning: {message}"))
 
     def note(self, message: str) -> None:
         """What is being done."""
         if not self.quiet:
-            click.echo(message, err=True, color=_colour())
+            self._say(message)
 
     def detail(self, message: str) -> None:
         """What only -v asks for."""
         if self.verbose:
-            click.echo(message, err=True, color=_colour())
+            self._say(message)
+
+    def watching(self) -> AbstractContextManager[None]:
+        """While it lasts, the stages of the compiler are shown: on a terminal, unless -q; with -v as messages."""
+        return self._display.watching()
 
     @contextmanager
     def progress(self, label: str, length: int) -> Iterator[Callable[[int], None] | None]:
@@ -71,7 +84,7 @@ def verbosity(command: F) -> F:
         return callback
 
     for short, name, text in (
-        ("-v", "verbose", "Say more: seconds of each stage, tracebacks."),
+        ("-v", "verbose", "Say more: each stage and its seconds, tracebacks."),
         ("-q", "quiet", "Say nothing but data and errors."),
     ):
         command = click.option(short, f"--{name}", is_flag=True, expose_value=False, callback=store(name), help=text)(

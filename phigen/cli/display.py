@@ -1,0 +1,72 @@
+"""The stages of the compiler on stderr: one line on a terminal, which changes as they do; with -v, a line for each."""
+
+from __future__ import annotations
+
+import shutil
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+from phigen import progress
+from phigen.progress import Stage
+
+#: Seconds before the line appears, and between two of its states.
+PATIENCE, PERIOD = 1.0, 0.2
+
+
+class Display:
+    """What shows the stages: ``shows`` says whether the line is wanted, ``began`` is called when a stage begins."""
+
+    def __init__(self, shows: Callable[[], bool], began: Callable[[str], None]) -> None:
+        self._shows, self._began = shows, began
+        self._stages: tuple[Stage, ...] = ()
+        self._start, self._visible, self._lock = time.perf_counter(), False, threading.Lock()
+        self._over = threading.Event()
+        self._painter: threading.Thread | None = None
+
+    @contextmanager
+    def watching(self) -> Iterator[None]:
+        """Show the stages of this thread while it lasts."""
+        try:
+            with progress.watched(self._told):
+                yield
+        finally:
+            self._over.set()
+            self.erase()
+
+    def erase(self) -> None:
+        """Make room for a message."""
+        with self._lock:
+            if self._visible:
+                sys.stderr.write("\r\x1b[K")
+                sys.stderr.flush()
+                self._visible = False
+
+    def _told(self, stages: tuple[Stage, ...]) -> None:
+        begins, self._stages = len(stages) > len(self._stages), stages
+        if begins:
+            self._began(_path(stages))
+        if not stages:
+            self.erase()
+        elif self._painter is None and self._shows():
+            self._painter = threading.Thread(target=self._paint, daemon=True)
+            self._painter.start()
+
+    def _paint(self) -> None:
+        while not self._over.wait(PERIOD):
+            with self._lock:
+                stages, now = self._stages, time.perf_counter()
+                if stages and now - self._start > PATIENCE and not self._over.is_set():
+                    self._draw(f"{_path(stages)}, {now - stages[0].began:.0f} s")
+
+    def _draw(self, line: str) -> None:
+        width = shutil.get_terminal_size().columns - 1
+        sys.stderr.write(f"\r{line if len(line) <= width else line[: width - 1] + '…'}\x1b[K")
+        sys.stderr.flush()
+        self._visible = True
+
+
+def _path(stages: tuple[Stage, ...]) -> str:
+    return ": ".join(map(str, stages))

@@ -1,0 +1,70 @@
+"""What is being done right now: stages by name, one within the other, for whoever watches.
+
+The compiler says where it is by ``with stage("Jacobi identity", total=n) as progress: … progress.done = k``. By default
+nobody watches, and a stage costs a microsecond. The command line shows them, see `phigen.cli.display`.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+
+class Stage:
+    """Some work: how much of it is done out of ``total`` pieces (0: not known), and since when."""
+
+    __slots__ = ("_end", "_stack", "began", "done", "name", "total")
+
+    def __init__(self, name: str, total: int = 0) -> None:
+        self.name, self.total, self.done = name, total, 0
+
+    def __enter__(self) -> Stage:
+        self.began = time.perf_counter()
+        self._stack = _here.stages
+        self._stack.append(self)
+        if _here.watcher:
+            _here.watcher(tuple(self._stack))
+        return self
+
+    def __exit__(self, *raised: object) -> None:
+        self._end = time.perf_counter()
+        self._stack.pop()
+        if _here.watcher:
+            _here.watcher(tuple(self._stack))
+
+    @property
+    def seconds(self) -> float:
+        """How long it took, once it is over."""
+        return self._end - self.began
+
+    def __str__(self) -> str:
+        return f"{self.name}, {self.done} of {self.total}" if self.total else self.name
+
+
+#: What is told when a stage begins or ends: the stages that last, the outermost first.
+Watcher = Callable[[tuple[Stage, ...]], None]
+
+stage = Stage
+
+
+class _Here(threading.local):
+    """The stages of one thread, and who watches them."""
+
+    def __init__(self) -> None:
+        self.stages: list[Stage] = []
+        self.watcher: Watcher | None = None
+
+
+_here = _Here()
+
+
+@contextmanager
+def watched(watcher: Watcher) -> Iterator[None]:
+    """While it lasts, ``watcher`` is told of the stages of this thread."""
+    before, _here.watcher = _here.watcher, watcher
+    try:
+        yield
+    finally:
+        _here.watcher = before

@@ -1,0 +1,84 @@
+"""Stages of the compiler on stderr: when they are shown, and that they leave nothing behind."""
+
+import io
+import time
+from contextlib import redirect_stderr
+
+import pytest
+
+from phigen import progress
+from phigen.cli import display
+from phigen.cli.console import Console
+
+
+class Terminal(io.StringIO):
+    """A terminal that only this process writes to."""
+
+    def isatty(self):
+        return True
+
+    def shows(self, text):
+        """Whether the text is drawn, within a second."""
+        end = time.monotonic() + 1
+        while text not in self.getvalue() and time.monotonic() < end:
+            time.sleep(0.001)
+        return text in self.getvalue()
+
+
+@pytest.fixture(autouse=True)
+def impatient(monkeypatch):
+    monkeypatch.setattr(display, "PATIENCE", 0)
+    monkeypatch.setattr(display, "PERIOD", 0.001)
+
+
+def shown(console, stream, name="top"):
+    """What is written while a stage lasts for a while."""
+    with redirect_stderr(stream), console.watching(), progress.stage(name):
+        time.sleep(0.05)
+    return stream.getvalue()
+
+
+def test_what_lasts_is_shown_on_a_terminal_and_erased_at_its_end():
+    with redirect_stderr(Terminal()) as terminal, Console().watching():
+        with progress.stage("top"), progress.stage("parts", total=12) as parts:
+            parts.done = 5
+            assert terminal.shows("\rtop: parts, 5 of 12, 0 s\x1b[K")
+        assert terminal.getvalue().endswith("\r\x1b[K")
+
+
+def test_a_message_takes_the_place_of_the_line():
+    console = Console()
+    with redirect_stderr(Terminal()) as terminal, console.watching(), progress.stage("top"):
+        assert terminal.shows("top")
+        console.note("a message")
+        assert "\r\x1b[Ka message\n" in terminal.getvalue()
+
+
+def test_short_work_shows_nothing(monkeypatch):
+    monkeypatch.setattr(display, "PATIENCE", 1000)
+    assert shown(Console(), Terminal()) == ""
+
+
+def test_quiet_and_pipes_show_nothing():
+    assert shown(Console(quiet=True), Terminal()) == ""
+    assert shown(Console(), io.StringIO()) == ""
+
+
+def test_long_lines_are_cut_to_the_terminal(monkeypatch):
+    monkeypatch.setenv("COLUMNS", "20")
+    drawn = shown(Console(), Terminal(), "a name that is longer than the line")
+    assert {len(line.removesuffix("\x1b[K")) for line in drawn.split("\r")[1:-1]} == {19}
+
+
+def test_stages_are_over_after_an_error():
+    with redirect_stderr(Terminal()) as terminal, Console().watching():
+        with pytest.raises(ValueError, match="wrong"), progress.stage("top"):
+            raise ValueError("wrong")
+        with progress.stage("next"):
+            assert terminal.shows("\rnext, ")
+
+
+def test_verbose_lists_stages_without_a_terminal(phigen, write):
+    listed = phigen("check", "-v", write("a.yaml")).stderr.splitlines()
+    assert [line for line in listed if line in ("a: system", "a: program")] == ["a: system", "a: program"]
+    assert phigen("check", "a.yaml").stderr.startswith("a.yaml: ")
