@@ -21,8 +21,12 @@ from phigen.realisations import karasev
 from phigen.series.hamilton_jacobi import graph_series
 from phigen.spec.model import BirealisationChoice
 from phigen.symbolic.expression import derivatives, gradient, number, symbol, total
+from phigen.symbolic.symbols import Symbol, momentum
 
 PATH_DIGITS = 30
+
+#: The size of one stage of a composition.
+STAGE = Symbol("h", "stage")
 
 
 @cache
@@ -99,7 +103,7 @@ class PreciseSystem:
         system = compilation.system
         self.system, self.coordinates, self.n = system, system.coordinates, len(system.coordinates)
         self.parameters = dict(parameters)
-        n, covector = self.n, [f"p:{c}" for c in self.coordinates]
+        n, covector = self.n, [momentum(c) for c in self.coordinates]
         slopes = [total(system.poisson[i][j] * symbol(covector[j]) for j in range(n)) for i in range(n)]
         columns = [derivatives(slopes, c) for c in self.coordinates]
         self._covector = covector
@@ -157,7 +161,7 @@ class PrecisePathStep(PreciseSystem):
         system = compilation.system
         alpha = karasev.series(system, max(terms - 1, 1))
         series = graph_series(system.hamiltonian, alpha, self.coordinates, terms, symmetric=True)
-        self.parameters["h:stage"] = mpmath.mpf(0)
+        self.parameters[STAGE] = mpmath.mpf(0)
         s = total(_power(i + 1) * term for i, term in enumerate(series))
         slope = gradient(s, self.coordinates)
         hessian = [d for c in self.coordinates for d in derivatives(slope, c)]  # symmetric: rows or columns
@@ -180,7 +184,7 @@ class PrecisePathStep(PreciseSystem):
 
     def _covector_of(self, x: list[Any], h: Any) -> Any:
         """The solution p of p = ∇S_h(mean), by a Newton iteration whose matrix is that of the first point."""
-        self.parameters["h:stage"] = h
+        self.parameters[STAGE] = h
         slope, hessian = self._generate(x)
         inverse = mpmath.inverse(mpmath.eye(self.n) - hessian * self.poisson(x) / 2)
         p, last = slope, mpmath.inf
@@ -216,7 +220,7 @@ class PrecisePathStep(PreciseSystem):
 
 
 def _power(exponent: int) -> Any:
-    step = symbol("h:stage")
+    step = symbol(STAGE)
     result = number(Fraction(1))
     for _ in range(exponent):
         result = result * step

@@ -33,6 +33,7 @@ from phigen.series.hamilton_jacobi import graph_series
 from phigen.spec.model import Run
 from phigen.symbolic.expression import Expression, derivatives, fold, gradient, number, symbol, total
 from phigen.symbolic.numeric import evaluate_with_scale
+from phigen.symbolic.symbols import momentum
 
 #: The corpus.
 NAMES = sorted(path.stem for path in resources.bundled_specs().glob("*.yaml"))
@@ -435,8 +436,8 @@ hamiltonian: x1 + x2 + x3
 
 
 def symbols(names: str) -> list[Expression]:
-    """Symbols from names separated by spaces."""
-    return [symbol(n) for n in names.split()]
+    """Symbols from names separated by spaces; ``p:x`` is the momentum of x."""
+    return [symbol(momentum(n[2:]) if n.startswith("p:") else n) for n in names.split()]
 
 
 def tool(name: str) -> str:

@@ -18,6 +18,7 @@ from typing import Any
 from phigen.symbolic.entire import ENTIRE
 from phigen.symbolic.expression import Expression, fold, natural_key
 from phigen.symbolic.readable import Formula
+from phigen.symbolic.symbols import GAUGE, PART, Symbol
 
 #: Characters of markup beyond which a part of a formula is left out; what is shared should have a name by then.
 LONGEST = 60_000
@@ -39,7 +40,7 @@ _FUNCTIONS = {
     "sign": "sgn", "phi0": "φ", "phi1": "φ′", "phi2": "φ″",
 }  # fmt: skip
 #: Symbols of phigen's own, ``p:x1`` and the like: the letter before the index.
-_OWN = {"gauge": "λ", "part": "σ"}
+_OWN = {GAUGE: "λ", PART: "σ"}
 
 _TIMES, _APPLY = "<mo>&#x2062;</mo>", "<mo>&#x2061;</mo>"  # both invisible
 _DOT, _DOTS = "<mo>·</mo>", "<mo>…</mo>"
@@ -338,10 +339,11 @@ def _one(factor: Factor) -> Sum:
 
 
 def _name(identifier: str) -> Factor:
-    head, colon, rest = identifier.partition(":")
     key = natural_key(identifier)
-    if colon:
-        return Factor(f"<mi>{escape(_OWN.get(head, head))}</mi>", index=name(rest) if rest else "", key=key)
+    if isinstance(identifier, Symbol):
+        letter = _OWN.get(identifier.kind, identifier.kind)
+        index = "".join(name(k) if isinstance(k, str) else name(str(k)) for k in identifier.key)
+        return Factor(f"<mi>{escape(letter)}</mi>", index=index, key=key)
     if identifier.isdigit():
         return Factor(f"<mn>{identifier}</mn>")
     found = re.fullmatch(r"([^\W\d_]+)_?([0-9]+)|([^\W_]+)_(\w+)", identifier)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from phigen.symbolic.expression import Expression, fold, raw, symbol, topological
 from phigen.symbolic.readable import Formula, expanded
+from phigen.symbolic.symbols import PART, Symbol
 
 #: What has fewer leaves than this gets no name of its own, nor what saves fewer leaves.
 SMALL, WORTH = 3, 4
@@ -80,7 +81,7 @@ def with_names(roots: Sequence[Expression]) -> tuple[tuple[tuple[str, Expression
         tree = raw(e.op, tuple(trees[id(a)] for a in e.args), e.value)
         size = sum(sizes[id(a)] for a in e.args) or 1
         if size >= SMALL and (uses[id(e)] - 1) * (size - 1) >= WORTH and e.op != "neg":
-            parts.append((f"part:{len(parts) + 1}", tree))
+            parts.append((Symbol(PART, len(parts) + 1), tree))
             tree, size = symbol(parts[-1][0]), 1
         trees[id(e)], sizes[id(e)] = tree, size
     return tuple(parts), [trees[id(r)] for r in roots]

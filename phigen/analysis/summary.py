@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from phigen.analysis.arrays import Floats, evaluate
 from phigen.geometry.system import System
 from phigen.spec.model import Run
+from phigen.symbolic.symbols import ELAPSED, initial
 
 #: Windows of equal length in which the largest energy error is taken, to tell drift from oscillation.
 WINDOWS = 10
@@ -178,8 +179,8 @@ def exact_solution(
     system: System, run: Run, parameters: Mapping[str, float], x0: Floats, t: Floats
 ) -> dict[str, Floats]:
     """The closed form of a run, coordinate by coordinate, for those it gives."""
-    values: dict[str, Any] = {"t:": t, **parameters}
-    values |= {f"x0:{c}": float(v) for c, v in zip(system.coordinates, x0, strict=True)}
+    values: dict[str, Any] = {ELAPSED: t, **parameters}
+    values |= {initial(c): float(v) for c, v in zip(system.coordinates, x0, strict=True)}
     arrays = evaluate(list(run.exact.values()), values)
     return {c: np.broadcast_to(a, t.shape) for c, a in zip(run.exact, arrays, strict=True)}
 

@@ -31,6 +31,7 @@ from phigen.symbolic.expression import (
     total,
 )
 from phigen.symbolic.special import SPECIAL, order_of
+from phigen.symbolic.symbols import plain
 
 #: sympy's names of functions where they differ.
 _FROM_SYMPY = {"Abs": "abs"}
@@ -87,7 +88,7 @@ def to_sympy(e: Expression) -> Any:
             case "number":
                 return sympy.Rational(node.value.numerator, node.value.denominator)
             case "symbol":
-                return sympy.Symbol(node.value.rstrip(":").replace("λ_", "lambda_").replace(":", "_"), real=True)
+                return sympy.Symbol(plain(node.value).replace("λ_", "lambda_"), real=True)
             case "pi":
                 return sympy.pi
             case "E":

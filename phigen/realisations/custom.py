@@ -6,7 +6,7 @@ from phigen.geometry.system import System
 from phigen.realisations.protocol import BiRealisation, covector_names, is_symmetric, refuse, simplified_differences
 from phigen.spec.model import BirealisationChoice
 from phigen.symbolic.expression import symbol, symbols_of
-from phigen.symbolic.readable import plain_name
+from phigen.symbolic.symbols import plain
 
 KIND = "custom"
 
@@ -19,9 +19,7 @@ def build(system: System, choice: BirealisationChoice) -> BiRealisation:
             raise refuse(f"birealisation {name} has {len(maps)} components for {system.dimension} coordinates")
         unknown = [s for s in symbols_of(*maps) if s not in allowed]
         if unknown:
-            raise refuse(
-                f"birealisation {name} uses {plain_name(unknown[0])}, which is no coordinate, parameter or p_NAME"
-            )
+            raise refuse(f"birealisation {name} uses {plain(unknown[0])}, which is no coordinate, parameter or p_NAME")
     x = [symbol(c) for c in system.coordinates]
     return BiRealisation(
         KIND,

@@ -21,8 +21,9 @@ from fractions import Fraction
 from phigen.geometry.ideals import applied, ideal_projections
 from phigen.geometry.lie_algebra import LieAlgebra
 from phigen.geometry.representations import indecomposable_parts, restricted
-from phigen.symbolic.expression import ZERO, Expression, call, number, symbols_of, total
+from phigen.symbolic.expression import ZERO, Expression, call, number, substitute, symbol, symbols_of, total
 from phigen.symbolic.special import coefficient
+from phigen.symbolic.symbols import plain
 from phigen.symbolic.tower import Poly, Tower
 
 #: Most terms of one component of M^k x in p and x that are worth looking at.
@@ -164,5 +165,5 @@ def _vanish(tower: Tower, vector: Sequence[Expression]) -> bool:
 
 
 def _shown(s: Expression) -> str:
-    written = str(s).replace("p:", "p_")
+    written = str(substitute([s], {name: symbol(plain(name)) for name in symbols_of(s)})[0])
     return written if len(written) < 60 else "a quadratic form in p"

@@ -31,12 +31,10 @@ from phigen.realisations.protocol import (
 from phigen.spec.model import BirealisationChoice
 from phigen.symbolic.expression import ZERO, Expression, derivatives, substitute, symbol, total
 from phigen.symbolic.readable import shortened
+from phigen.symbolic.symbols import MATRIX
 from phigen.symbolic.verdict import decide_zero
 
 KIND = "group-map"
-
-#: The matrix P = Σ p_i E_i in an expression for τ.
-MATRIX = "P:"
 
 
 def build(system: System, choice: BirealisationChoice) -> BiRealisation:

@@ -9,6 +9,7 @@ from phigen.errors import Diagnostic, SpecError
 from phigen.geometry.system import System
 from phigen.spec.model import BirealisationChoice
 from phigen.symbolic.expression import Expression, substitute, symbol, symbols_of, topological
+from phigen.symbolic.symbols import momentum
 from phigen.symbolic.tower import Tower
 
 PAPER = (
@@ -21,7 +22,7 @@ PAPER = (
 class BiRealisation:
     """Maps α, β : (x, p) → x with the axioms that `phigen.realisations.axioms` proves.
 
-    All tuples have one expression for each coordinate, in the symbols NAME (x), ``p:NAME`` (its covector) and
+    All tuples have one expression for each coordinate, in the symbols NAME (x), ``momentum(NAME)`` (its covector) and
     the parameters. With {x_i, p_j} = δ_ij: {α_i, α_j} = π_ij∘α, {β_i, β_j} = −π_ij∘β, {α_i, β_j} = 0.
 
     - ``displacement``: α − x, simplified, so that nothing of size x cancels in it
@@ -67,8 +68,8 @@ Builder = Callable[[System, BirealisationChoice], BiRealisation]
 
 
 def covector_names(coordinates: Sequence[str]) -> tuple[str, ...]:
-    """Names ``p:NAME`` of the covector's symbols."""
-    return tuple(f"p:{c}" for c in coordinates)
+    """The names of the covector's symbols."""
+    return tuple(momentum(c) for c in coordinates)
 
 
 def covector_symbols(coordinates: Sequence[str]) -> list[Expression]:

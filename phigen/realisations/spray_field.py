@@ -17,7 +17,8 @@ from phigen.geometry.system import System, hamiltonian_vector_field
 from phigen.realisations.cotangent import Components, Cotangent, GradedForm
 from phigen.realisations.protocol import covector_names, covector_symbols, refuse
 from phigen.symbolic.expression import ZERO, Expression, symbol, symbols_of
-from phigen.symbolic.readable import plain_name, shortened
+from phigen.symbolic.readable import shortened
+from phigen.symbolic.symbols import plain
 from phigen.symbolic.tower import Poly
 
 #: Most terms of one polynomial of a series.
@@ -74,7 +75,7 @@ def _checked(system: System, forces: Sequence[Expression]) -> Sequence[Expressio
     allowed = {*system.coordinates, *system.parameter_names, *covector_names(system.coordinates)}
     unknown = [s for s in symbols_of(*forces) if s not in allowed]
     if unknown:
-        raise refuse(f"spray uses {plain_name(unknown[0])}, which is no coordinate, parameter or p_NAME")
+        raise refuse(f"spray uses {plain(unknown[0])}, which is no coordinate, parameter or p_NAME")
     return forces
 
 

@@ -9,7 +9,7 @@ from phigen.geometry.system import System
 from phigen.realisations.protocol import BiRealisation
 from phigen.scheme.discretisation import MOST_OPERATIONS, Discretisation, too_large
 from phigen.scheme.gauge import Gauge, Gauged, free_gauge
-from phigen.scheme.generating import STEP, GeneratingFunction
+from phigen.scheme.generating import GeneratingFunction
 from phigen.scheme.kernel import Kernel, Output
 from phigen.scheme.kernels import (
     explicit_kernel,
@@ -30,6 +30,7 @@ from phigen.scheme.staging import Coefficients
 from phigen.scheme.steps import Explicit, InnerSolve, Newton, Path, PathLanes, PathTangent, Step
 from phigen.scheme.tangent import curvature, explicit_jacobian, tangent_path
 from phigen.spec.model import NO_EXTRAS, Extras, SolverOptions
+from phigen.symbolic.symbols import STEP
 
 #: Largest dimension in which paths are followed in lanes. In five and six their derivatives cost what lanes save:
 #: measured, blocks take 0.6 to 1.9 times as long as single steps.

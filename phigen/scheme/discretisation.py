@@ -11,11 +11,12 @@ from phigen.geometry.system import System
 from phigen.realisations import karasev
 from phigen.realisations.protocol import BiRealisation
 from phigen.scheme.composition import find, orders
-from phigen.scheme.generating import STEP, GeneratingFunction, collected_form, graph_form
+from phigen.scheme.generating import GeneratingFunction, collected_form, graph_form
 from phigen.scheme.order import Order
 from phigen.series.hamilton_jacobi import HamiltonJacobi
 from phigen.spec.names import FLOW_COMPOSITIONS
 from phigen.symbolic.expression import Expression
+from phigen.symbolic.symbols import STEP
 
 #: Most operations in one kernel; about 5 MB of C and a minute of compilation.
 MOST_OPERATIONS = 100_000

@@ -11,6 +11,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from phigen.symbolic.expression import ZERO, Expression, symbol, total
+from phigen.symbolic.symbols import Symbol
 
 #: pattern[i][j]: whether entry (i, j) may differ from zero; the diagonal always may.
 Pattern = Sequence[Sequence[bool]]
@@ -47,9 +48,9 @@ class Factors:
         """All numbers that `solved` reads: reciprocal pivots, multipliers, entries of U."""
         return (*self.reciprocals, *self.lower.values(), *self.upper.values())
 
-    def named(self, prefix: str) -> Factors:
-        """The same with symbols ``prefix:k`` for `values`."""
-        names: Iterator[Expression] = (symbol(f"{prefix}:{k}") for k in range(len(self.values)))
+    def named(self, kind: str) -> Factors:
+        """The same with symbols of that kind for `values`."""
+        names: Iterator[Expression] = (symbol(Symbol(kind, k)) for k in range(len(self.values)))
         reciprocals = tuple(next(names) for _ in self.reciprocals)
         lower = {place: next(names) for place in self.lower}
         return Factors(self.order, lower, {place: next(names) for place in self.upper}, reciprocals)
@@ -68,7 +69,7 @@ class Factors:
 def factorise(pattern: Pattern) -> Factors:
     """The factors of the matrix with entries ``J:i:j`` where the pattern has them."""
     n = len(pattern)
-    a = [[symbol(f"J:{i}:{j}") if pattern[i][j] or i == j else ZERO for j in range(n)] for i in range(n)]
+    a = [[symbol(Symbol("J", i, j)) if pattern[i][j] or i == j else ZERO for j in range(n)] for i in range(n)]
     lower: dict[tuple[int, int], Expression] = {}
     upper: dict[tuple[int, int], Expression] = {}
     reciprocals: list[Expression] = [ZERO] * n
@@ -87,7 +88,7 @@ def factorise(pattern: Pattern) -> Factors:
 def elimination(pattern: Pattern) -> tuple[list[Expression], tuple[Expression, ...]]:
     """The solution for the right-hand side ``r:i``, and the reciprocal pivots."""
     factors = factorise(pattern)
-    return factors.solved([symbol(f"r:{i}") for i in range(len(pattern))]), factors.reciprocals
+    return factors.solved([symbol(Symbol("r", i)) for i in range(len(pattern))]), factors.reciprocals
 
 
 def inversion(n: int) -> tuple[list[Expression], list[Expression], list[Expression]]:
@@ -95,7 +96,7 @@ def inversion(n: int) -> tuple[list[Expression], list[Expression], list[Expressi
 
     Symbols ``J:i:j`` and ``K:i:j``.
     """
-    a = [[symbol(f"J:{i}:{j}") for j in range(n)] for i in range(n)]
+    a = [[symbol(Symbol("J", i, j)) for j in range(n)] for i in range(n)]
     reciprocals: list[Expression] = []
     for k in range(n):
         reciprocals.append(1 / a[k][k])
@@ -103,5 +104,5 @@ def inversion(n: int) -> tuple[list[Expression], list[Expression], list[Expressi
         for i in (i for i in range(n) if i != k):
             factor = a[i][k]
             a[i] = [-(factor * a[k][j]) if j == k else a[i][j] - factor * a[k][j] for j in range(n)]
-    product = [total(symbol(f"K:{i}:{k}") * a[k][j] for k in range(n)) for i in range(n) for j in range(n)]
+    product = [total(symbol(Symbol("K", i, k)) * a[k][j] for k in range(n)) for i in range(n) for j in range(n)]
     return [e for row in a for e in row], product, reciprocals

@@ -19,6 +19,7 @@ from phigen.scheme.kernel import Kernel, Output
 from phigen.scheme.program import FreeGauge
 from phigen.series.hamilton_jacobi import HamiltonJacobi, PolynomialSeries
 from phigen.symbolic.expression import Expression, gradient, symbol, total
+from phigen.symbolic.symbols import GAUGE, Symbol
 
 #: Gauged series may have this many times the terms of the plain one; beyond, the gauge costs more than it gains.
 MOST_GROWTH = 1.3
@@ -37,7 +38,7 @@ class Gauge:
     @property
     def symbols(self) -> tuple[str, ...]:
         """The symbols of the free λ."""
-        return tuple(f"gauge:{name}" for name in self.free)
+        return tuple(Symbol(GAUGE, name) for name in self.free)
 
     @property
     def inputs(self) -> dict[str, tuple[str, ...]]:
@@ -80,7 +81,7 @@ def choose(system: System, realisation: BiRealisation, setting: str | Mapping[st
         return plain
     for name in system.casimirs:
         candidate = _gauged(system, realisation, Gauge((*chosen.gauge.free, name)))
-        if _worthwhile(plain, candidate, f"gauge:{name}"):
+        if _worthwhile(plain, candidate, Symbol(GAUGE, name)):
             chosen = candidate
     return chosen
 

@@ -18,9 +18,7 @@ from phigen.scheme.lowering import cost
 from phigen.scheme.staging import Coefficients
 from phigen.series.hamilton_jacobi import PolynomialSeries
 from phigen.symbolic.expression import Expression, derivatives, gradient, symbol, total
-
-#: The step size, as a symbol.
-STEP = "h:"
+from phigen.symbolic.symbols import STEP
 
 
 @dataclass(frozen=True)

@@ -17,8 +17,8 @@ from phigen.scheme.program import Observables
 from phigen.scheme.staging import Coefficients
 from phigen.scheme.step import at_momenta, explicit_increment, explicit_order, linearise
 from phigen.scheme.steps import Factorisation
-from phigen.series.hamilton_jacobi import momentum
 from phigen.symbolic.expression import ONE, ZERO, Expression, number, symbol, total
+from phigen.symbolic.symbols import Symbol, momentum
 
 #: Largest dimension whose elimination is unrolled in any case; beyond, where zeros leave no more than such a part of n³
 #: operations (a full matrix takes 0.7).
@@ -87,7 +87,7 @@ def newton_solvers(linearised: Kernel) -> Solvers:
     if n <= UNROLLED:
         return Solvers(_elimination_kernel(jacobian), inverse(n))
     factors = factorise(jacobian)
-    if cost(factors.solved([symbol(f"r:{i}") for i in range(n)])) > SPARSE * n**3:
+    if cost(factors.solved([symbol(Symbol("r", i)) for i in range(n)])) > SPARSE * n**3:
         return Solvers()
     return Solvers(_elimination_kernel(jacobian), factors=_factorisation(factors, slope))
 
@@ -107,21 +107,21 @@ def _elimination_kernel(pattern: Pattern) -> Kernel:
     return Kernel(
         "eliminate",
         "elimination without pivoting: the solution, and the reciprocals of the pivots",
-        {"matrix": _entries("J", n), "side": tuple(f"r:{i}" for i in range(n))},
+        {"matrix": _entries("J", n), "side": tuple(Symbol("r", i) for i in range(n))},
         (Output("solution", tuple(solution)), Output("reciprocal", reciprocals)),
     )
 
 
 def _entries(name: str, n: int) -> tuple[str, ...]:
-    return tuple(f"{name}:{i}:{j}" for i in range(n) for j in range(n))
+    return tuple(Symbol(name, i, j) for i in range(n) for j in range(n))
 
 
 def _factorisation(factors: Factors, slope: Pattern) -> Factorisation:
     """Elimination in two parts, for many right-hand sides, and the product of each solution with the slope."""
     n, named = len(slope), factors.named("f")
-    side = tuple(f"r:{i}" for i in range(n))
+    side = tuple(Symbol("r", i) for i in range(n))
     solution = named.solved([symbol(s) for s in side])
-    product = [total(symbol(f"K:{i}:{j}") * solution[j] for j in range(n) if slope[i][j]) for i in range(n)]
+    product = [total(symbol(Symbol("K", i, j)) * solution[j] for j in range(n) if slope[i][j]) for i in range(n)]
     return Factorisation(
         Kernel(
             "factorise",
@@ -132,7 +132,7 @@ def _factorisation(factors: Factors, slope: Pattern) -> Factorisation:
         Kernel(
             "substitute",
             "the solution for a right-hand side, from the factors, and the slope times it",
-            {"factor": tuple(str(e.value) for e in named.values), "slope": _entries("K", n), "side": side},
+            {"factor": tuple(e.value for e in named.values), "slope": _entries("K", n), "side": side},
             (Output("solution", tuple(solution)), Output("product", tuple(product))),
         ),
     )

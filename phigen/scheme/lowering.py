@@ -13,6 +13,7 @@ from fractions import Fraction
 from phigen.symbolic.entire import ENTIRE
 from phigen.symbolic.expression import Expression, fold, raw, symbol, topological
 from phigen.symbolic.special import SPECIAL
+from phigen.symbolic.symbols import TEMPORARY, Symbol
 
 #: Cost of an operation in units of one addition, as measured on current x86-64 processors (throughput). φ and its
 #: derivatives are nine-term series near 0, and a test.
@@ -105,7 +106,7 @@ def operation_counts(roots: Sequence[Expression]) -> dict[str, int]:
 
 
 def assign(
-    roots: Sequence[Expression], named: Mapping[int, str] | None = None, prefix: str = "t"
+    roots: Sequence[Expression], named: Mapping[int, str] | None = None
 ) -> tuple[list[Assignment], list[Expression]]:
     """Assignments of temporaries, and the roots as trees over them.
 
@@ -138,7 +139,7 @@ def assign(
                 target = named[id(e)]
             else:
                 count += 1
-                target = f"{prefix}:{count}"
+                target = Symbol(TEMPORARY, count)
             assignments.append(Assignment(target, tree))
             tree, size = symbol(target), 0
         trees[id(e)], sizes[id(e)] = tree, size

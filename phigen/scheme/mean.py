@@ -13,6 +13,7 @@ from phigen.scheme.elimination import inversion
 from phigen.scheme.kernel import Kernel, Output
 from phigen.scheme.step import Matrix
 from phigen.symbolic.expression import ONE, ZERO, Expression, substitute, symbol, total
+from phigen.symbolic.symbols import Symbol
 
 
 def along_mean(n: int) -> Kernel:
@@ -21,8 +22,8 @@ def along_mean(n: int) -> Kernel:
     For p held fixed m follows y by M⁻¹, M the derivative of the mean along m; with p = ∇S_h(y) by M⁻¹ (1 − N H), N that
     along p and H the Hessian of S_h.
     """
-    inputs = {name: tuple(f"{name}:{i}" for i in range(2 * n * n)) for name in ("even", "odd", "mean")}
-    inputs["hessian"] = tuple(f"hessian:{i}" for i in range(n * n))
+    inputs = {name: tuple(Symbol(name, i) for i in range(2 * n * n)) for name in ("even", "odd", "mean")}
+    inputs["hessian"] = tuple(Symbol("hessian", i) for i in range(n * n))
     hessian = _matrix([symbol(s) for s in inputs["hessian"]], n, n, 0)
     even, odd, mean = ([symbol(s) for s in inputs[name]] for name in ("even", "odd", "mean"))
     start, change = [a - b for a, b in zip(even, odd, strict=True)], [2 * b for b in odd]
@@ -58,6 +59,6 @@ def _times(a: Matrix, b: Matrix) -> Matrix:
 def _inverse(a: Matrix) -> tuple[Matrix, list[Expression]]:
     n = len(a)
     inverse, _, reciprocals = inversion(n)
-    values = {f"J:{i}:{j}": a[i][j] for i in range(n) for j in range(n)}
+    values: dict[str, Expression] = {Symbol("J", i, j): a[i][j] for i in range(n) for j in range(n)}
     done = substitute([*inverse, *reciprocals], values)
     return _matrix(done, n, n, 0), done[n * n :]

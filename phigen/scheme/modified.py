@@ -10,12 +10,12 @@ from phigen.geometry.system import System
 from phigen.realisations.protocol import BiRealisation
 from phigen.scheme.discretisation import formal_alpha, too_large
 from phigen.scheme.gauge import Gauge
-from phigen.scheme.generating import STEP
 from phigen.scheme.kernel import Kernel, Output
 from phigen.scheme.order import Order
 from phigen.scheme.program import Modified
 from phigen.series.modified import ModifiedSeries, modified_series
 from phigen.symbolic.expression import Expression, number, substitute
+from phigen.symbolic.symbols import STEP
 
 
 def powers(order: Order, count: int, *, symmetric: bool) -> list[int]:

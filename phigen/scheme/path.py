@@ -14,8 +14,8 @@ from fractions import Fraction
 from phigen.geometry.system import System, hamiltonian_vector_field
 from phigen.scheme.lowering import expand_powers
 from phigen.scheme.staging import Coefficients
-from phigen.series.hamilton_jacobi import momentum
 from phigen.symbolic.expression import Expression, derivatives, fold, partials, raw, symbol
+from phigen.symbolic.symbols import FIXED, SERIES, Symbol, momentum
 from phigen.symbolic.taylor import closure
 
 
@@ -184,11 +184,11 @@ class _Builder:
     def _value(self, e: Expression) -> Expression:
         """The value of a node at order 0, as a symbol or a number."""
         if id(e) in self._series_of:
-            return symbol(f"s:{self._series_of[id(e)]}")
+            return symbol(Symbol(SERIES, self._series_of[id(e)]))
         if not e.args:
             return e
         if id(e) not in self._fixed_of:
-            self._fixed_of[id(e)] = symbol(f"f:{len(self.fixed)}")
+            self._fixed_of[id(e)] = symbol(Symbol(FIXED, len(self.fixed)))
             self.fixed.append(e)
         return self._fixed_of[id(e)]
 

@@ -88,7 +88,7 @@ def _flow_kernel(system: System, flow: Flow, k: int, coefficients: Coefficients)
     increment = _staged(flow, coefficients)
     return Kernel(
         f"flow{k}",
-        f"the flow of H_{k} = {flow.hamiltonian}: {flow.manner}".replace(KICK, KICK[:-1]),
+        f"the flow of H_{k} = {flow.hamiltonian}: {flow.manner}".replace(KICK, KICK.kind),
         {"coef": coefficients.slots, "state": system.coordinates},
         (Output("increment", tuple(increment)),),
     )

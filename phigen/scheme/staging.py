@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from phigen.symbolic.expression import Expression, fold, rebuild, substitute, symbol, symbols_of, topological
+from phigen.symbolic.symbols import COEFFICIENT, Symbol, coefficient, kind_of
 
 
 class Coefficients:
@@ -18,7 +19,7 @@ class Coefficients:
     @property
     def slots(self) -> tuple[str, ...]:
         """The symbols of all coefficients so far."""
-        return tuple(f"c:{k}" for k in range(len(self.values)))
+        return tuple(coefficient(k) for k in range(len(self.values)))
 
     def empty(self) -> Coefficients:
         """A table with the same static symbols and no values."""
@@ -32,7 +33,7 @@ class Coefficients:
         fixed: dict[int, bool] = {}
         for e in topological(roots):
             if e.op == "symbol":
-                fixed[id(e)] = e.value in self._static or e.value.startswith("c:")
+                fixed[id(e)] = e.value in self._static or kind_of(e.value) == COEFFICIENT
             else:
                 fixed[id(e)] = all(fixed[id(a)] for a in e.args)
 
@@ -57,9 +58,9 @@ class Coefficients:
         if k is None:
             k = self._index[id(e)] = len(self.values)
             self.values.append(e)
-        return symbol(f"c:{k}")
+        return symbol(coefficient(k))
 
     def _written_out(self, e: Expression) -> Expression:
         """The expression with coefficients that occur in it replaced by what they stand for."""
-        used = [n for n in symbols_of(e) if n.startswith("c:")]
-        return substitute([e], {n: self.values[int(n[2:])] for n in used})[0] if used else e
+        used = [n for n in symbols_of(e) if isinstance(n, Symbol) and n.kind == COEFFICIENT]
+        return substitute([e], {n: self.values[int(n.key[0])] for n in used})[0] if used else e

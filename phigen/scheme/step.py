@@ -16,7 +16,6 @@ from dataclasses import dataclass
 from graphlib import CycleError, TopologicalSorter
 
 from phigen.scheme.generating import GeneratingFunction
-from phigen.series.hamilton_jacobi import momentum
 from phigen.symbolic.expression import (
     ONE,
     ZERO,
@@ -27,6 +26,7 @@ from phigen.symbolic.expression import (
     symbols_of,
     total,
 )
+from phigen.symbolic.symbols import momentum
 
 Matrix = list[list[Expression]]
 

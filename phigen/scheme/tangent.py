@@ -15,13 +15,8 @@ from phigen.scheme.generating import GeneratingFunction
 from phigen.scheme.kernel import Kernel, Output
 from phigen.scheme.path import Recurrences, path_of
 from phigen.scheme.staging import Coefficients
-from phigen.series.hamilton_jacobi import momentum
 from phigen.symbolic.expression import Expression, derivatives, symbol, total
-
-
-def variation(name: str) -> str:
-    """The symbol of the variation of a coordinate."""
-    return f"v:{name}"
+from phigen.symbolic.symbols import momentum, variation
 
 
 def explicit_jacobian(

@@ -17,6 +17,7 @@ from functools import cached_property
 from typing import Any
 
 from phigen.symbolic.expression import ZERO, Expression, gradient, substitute
+from phigen.symbolic.symbols import momentum
 from phigen.symbolic.taylor import ExpressionRing, Taylor, closure
 from phigen.symbolic.tower import Poly, Tower
 
@@ -30,11 +31,6 @@ class PolynomialSeries:
 
     tower: Tower
     terms: tuple[Poly, ...]
-
-
-def momentum(name: str) -> str:
-    """The symbol of the covector component that belongs to a coordinate."""
-    return f"p:{name}"
 
 
 def composed(hamiltonian: Expression, coordinates: Sequence[str], alpha: Sequence[Expression]) -> Expression:

@@ -17,13 +17,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from phigen.series.hamilton_jacobi import PolynomialSeries, composed, momentum, polynomial_series
+from phigen.series.hamilton_jacobi import PolynomialSeries, composed, polynomial_series
 from phigen.symbolic.expression import Expression
+from phigen.symbolic.symbols import Symbol, momentum
 from phigen.symbolic.taylor import Taylor
 from phigen.symbolic.tower import Poly, Tower
 
 #: The fraction σ of the step, as a symbol.
-FRACTION = "sigma:"
+FRACTION = Symbol("sigma")
 
 #: Corrections with more monomials than this are not computed further.
 MOST_TERMS = 5_000

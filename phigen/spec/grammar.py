@@ -40,6 +40,7 @@ from phigen.symbolic.expression import (
     sub,
     symbol,
 )
+from phigen.symbolic.symbols import Symbol
 
 CONSTANTS = {"pi": PI, "E": EULER}
 
@@ -324,7 +325,7 @@ class _Parser:
             self.unknown.add(token.text)
             message, hint = self.scope.unknown(token.text)
             self.report(message, token.index, hint)
-        return symbol(f"unknown:{token.text}")
+        return symbol(Symbol("unknown", token.text))
 
     def call(self, token: Token) -> Expression:
         opening = self.here

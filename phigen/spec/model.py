@@ -1,8 +1,8 @@
 """What a spec file says, as data: the first stage of the compiler.
 
 Nothing here is checked mathematically. Expressions have their definitions substituted and use the names
-of the spec's coordinates and parameters as symbols; ``p_NAME`` in a custom bi-realisation is the symbol
-``p:NAME``. Decimals are exact rationals.
+of the spec's coordinates and parameters as symbols; ``p_NAME`` in a custom bi-realisation is the
+symbol ``momentum(NAME)``. Decimals are exact rationals.
 """
 
 from __future__ import annotations
@@ -106,7 +106,7 @@ class BirealisationChoice:
     beta: tuple[Expression, ...] = ()
     side: str = "q"  # canonical-euler
     of: str = "auto"  # product, pullback: the kind for the blocks, for the structure that is pulled back
-    tau: Expression | Matrix | None = None  # group-map: f(P) with the symbol P:, or the entries of τ in p:NAME
+    tau: Expression | Matrix | None = None  # group-map: f(MATRIX), or the entries of τ in the momenta
     spray: str | tuple[Expression, ...] = "auto"  # spray: auto, flat, natural or the components f_j(x, p)
     degree: int | None = None  # spray: degree in p of a truncation, None for what the order needs
     order: int | None = None
@@ -149,7 +149,7 @@ class Run:
     steps: int
     stride: int = 1
     parameters: Mapping[str, Fraction] = field(default_factory=dict)
-    exact: Mapping[str, Expression] = field(default_factory=dict)  # symbols t:, x0:NAME, parameters
+    exact: Mapping[str, Expression] = field(default_factory=dict)  # in ELAPSED, initial(NAME), parameters
     compare: tuple[str, ...] = ()
     section: Expression | None = None
     description: str = ""

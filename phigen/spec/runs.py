@@ -13,6 +13,7 @@ from phigen.spec.model import Run
 from phigen.spec.problems import counted, did_you_mean, shown
 from phigen.spec.yaml_source import Scalar
 from phigen.symbolic.expression import Expression, symbol
+from phigen.symbolic.symbols import ELAPSED, initial
 
 #: A duration counts as a multiple of the step up to this relative error: decimals of users are rounded.
 NEAR_INTEGER = Fraction(1, 10**9)
@@ -107,7 +108,7 @@ def _overrides(given: Mapping[str, tuple[Scalar, Scalar | None]], declared: Decl
 def _exact(given: Mapping[str, tuple[Scalar, Scalar | None]], declared: Declarations) -> dict[str, Expression]:
     if not given:
         return {}
-    own = {"t": symbol("t:")} | {f"x0_{c}": symbol(f"x0:{c}") for c in declared.coordinates}
+    own = {"t": symbol(ELAPSED)} | {f"x0_{c}": symbol(initial(c)) for c in declared.coordinates}
     for name in (*declared.parameters, *declared.definitions):
         if name in own:
             message = f"the name {name!r} has a meaning of its own in the exact solution of a run"

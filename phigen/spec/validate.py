@@ -17,6 +17,7 @@ from phigen.spec.problems import Problems, counted, did_you_mean, shown
 from phigen.spec.runs import run, without_repetition
 from phigen.spec.yaml_source import Scalar, decode, read
 from phigen.symbolic.expression import ZERO, Expression, symbol, symbols_of
+from phigen.symbolic.symbols import MATRIX, momentum
 
 DEFAULT_ORDER = 4
 #: Options of bi-realisations and the kind that each belongs to.
@@ -156,7 +157,7 @@ def _group_map(options: Mapping[str, Any], declared: Declarations) -> Birealisat
         declared.reader.problems.add("birealisation: the kind group-map needs tau", place, hint)
         return BirealisationChoice(kind="group-map")
     if isinstance(given, Scalar):
-        scope = declared.constants("tau, a function of the matrix P,", {"P": symbol("P:")})
+        scope = declared.constants("tau, a function of the matrix P,", {"P": symbol(MATRIX)})
         if "P" in declared.nodes:
             message = "the name 'P' means the matrix Σ p_i E_i in tau"
             declared.reader.error(declared.nodes["P"], message, "choose another name, or give tau entry by entry")
@@ -201,7 +202,7 @@ def _on_covectors(
 
 def _momenta(declared: Declarations, where: str) -> dict[str, Expression]:
     """The names ``p_NAME``, which must not be those of something else."""
-    momenta = {f"p_{c}": symbol(f"p:{c}") for c in declared.coordinates}
+    momenta = {f"p_{c}": symbol(momentum(c)) for c in declared.coordinates}
     for name in [c for c in momenta if c in declared.nodes]:
         message = f"the name {name!r} means the momentum of {name[2:]!r} in {where}"
         declared.reader.error(declared.nodes[name], message, "choose another name")

@@ -13,6 +13,7 @@ from phigen.geometry.field import Field
 from phigen.geometry.linear import kernel
 from phigen.splitting.ring import TIME, Ring
 from phigen.symbolic.expression import Expression, number, substitute, symbol, total
+from phigen.symbolic.symbols import Symbol
 from phigen.symbolic.tower import Poly, Tower, rational
 
 
@@ -43,7 +44,7 @@ def reduced(ring: Ring, field: Sequence[Poly]) -> Reduced | None:
         others = total(
             number(rational(c)) * symbol(ring.coordinates[moving[k]]) for k, c in relation.items() if moving[k] != pivot
         )
-        name = f"integral:{ring.coordinates[pivot]}"
+        name = Symbol("integral", ring.coordinates[pivot])
         integrals[name] = symbol(ring.coordinates[pivot]) + others
         forms[pivot] = others
     values = {ring.coordinates[i]: symbol(n) - e for (i, e), n in zip(forms.items(), integrals, strict=True)}

@@ -16,13 +16,14 @@ from phigen.geometry.shapes import Matrix
 from phigen.geometry.system import System
 from phigen.symbolic.expression import Expression, number, symbol
 from phigen.symbolic.horner import horner
+from phigen.symbolic.symbols import STEP, Symbol
 from phigen.symbolic.tower import Poly, Tower, rational
 
 #: The time of a flow, as a symbol: the step size of the solver.
-TIME = "h:"
+TIME = STEP
 
 #: The multiple κ of {V, {V, T}} in a kick with modified potential, as a symbol: see `phigen.splitting.kicks`.
-KICK = "κ:"
+KICK = Symbol("κ")
 
 #: Exponents of some of the ring's variables.
 Monomial = tuple[int, ...]

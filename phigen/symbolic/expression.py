@@ -21,7 +21,8 @@ a function  ``None``                its arguments, see `FUNCTIONS`
 =========== ======================= =====================================
 
 A quotient is a product with a ``pow`` of exponent −1. Names of symbols that phigen makes itself contain
-a colon (``p:x1``, ``h:``), which no name in a spec can; they never clash with names of the user.
+a colon (``p:x1``, ``h:``), which no name in a spec can; they never clash with names of the user, see
+`phigen.symbolic.symbols`.
 """
 
 from __future__ import annotations
@@ -173,6 +174,8 @@ def number(value: Number) -> Expression:
 
 def symbol(name: str) -> Expression:
     """The symbol of that name; two symbols are the same if and only if their names are."""
+    if type(name) is str and ":" in name:
+        raise ValueError(f"{name!r} is no name of a spec; phigen's own are of the type Symbol")
     return _node("symbol", (), name)
 
 

@@ -17,6 +17,7 @@ from phigen.symbolic.expression import (
     text,
     topological,
 )
+from phigen.symbolic.symbols import Symbol, plain
 from phigen.symbolic.tower import Poly, Tower, rational
 
 #: Terms of a formula that are shown unless all are asked for.
@@ -86,8 +87,8 @@ def readable(expressions: Sequence[Expression], most: int | None = SHOWN) -> lis
     """The expressions as text, expanded where that is shorter; covectors are written ``p_NAME``."""
     shown = with_plain_names(expressions)
     forms = expanded(shown, most)
-    plain = [_written(e) for e in shown]
-    return [min((str(f), t), key=len) if f else t for f, t in zip(forms, plain, strict=True)]
+    texts = [_written(e) for e in shown]
+    return [min((str(f), t), key=len) if f else t for f, t in zip(forms, texts, strict=True)]
 
 
 def _written(e: Expression) -> str:
@@ -135,15 +136,10 @@ def _infix(e: Expression) -> str:
     return fold([e], visit)[0][0]
 
 
-def plain_name(name: str) -> str:
-    """The name of a symbol for readers: ``p_x1`` for ``p:x1``, as in specs, λ_C for ``gauge:C``."""
-    return name.rstrip(":").replace("gauge:", "λ_").replace(":", "_")
-
-
 def with_plain_names(expressions: Sequence[Expression]) -> list[Expression]:
-    """The expressions with phigen's own symbols under `plain_name`."""
-    names = [n for n in symbols_of(*expressions) if ":" in n]
-    return substitute(expressions, {n: symbol(plain_name(n)) for n in names})
+    """The expressions with phigen's own symbols under their `plain` names."""
+    own = [n for n in symbols_of(*expressions) if isinstance(n, Symbol)]
+    return substitute(expressions, {n: symbol(plain(n)) for n in own})
 
 
 def shortened(expression: Expression) -> str:

@@ -19,6 +19,7 @@ from phigen.symbolic.entire import ENTIRE
 from phigen.symbolic.expression import EULER, ONE, PI, Expression, call, derivatives, fold, number, power, symbol
 from phigen.symbolic.horner import horner
 from phigen.symbolic.special import SPECIAL, coefficient, order_of
+from phigen.symbolic.symbols import Symbol
 
 #: An element of a tower: ``flint.fmpq_mpoly``. Elements of different towers do not mix.
 Poly = Any
@@ -106,7 +107,7 @@ class Tower:
                 self._grow(missing)
 
     def _grow(self, missing: _MissingError) -> None:
-        name = f"g:{len(self.generators)}"
+        name = Symbol("g", len(self.generators))
         arguments = [self.expression(a) for a in missing.arguments]
         self.generators.append(
             Generator(

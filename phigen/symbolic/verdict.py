@@ -8,7 +8,8 @@ from fractions import Fraction
 
 from phigen.symbolic.expression import Expression, symbols_of
 from phigen.symbolic.numeric import DomainError, evaluate_exactly, evaluate_with_scale, is_rational
-from phigen.symbolic.readable import LONGEST, cut, of_polynomial, plain_name
+from phigen.symbolic.readable import LONGEST, cut, of_polynomial
+from phigen.symbolic.symbols import MOMENTUM, kind_of, plain
 from phigen.symbolic.tower import Poly, Tower
 
 PROVED = "proved"
@@ -102,7 +103,7 @@ def _refuting_point(expression: Expression, positive: Collection[str]) -> str | 
         except DomainError:
             continue
         if value:
-            where = ", ".join(f"{plain_name(n)}={v}" for n, v in point.items())
+            where = ", ".join(f"{plain(n)}={v}" for n, v in point.items())
             return f"{where if len(where) <= LONGEST else f'point {k}'}: {value}"
         tried += 1
         if tried == POINTS or not names:
@@ -136,7 +137,7 @@ def sample_point(names: Sequence[str], positive: Collection[str], index: int) ->
         value = Fraction(1 + denominator // 5 + draws[1] % (3 * denominator - denominator // 5), denominator)
         if index % 2 and draws[2] % 2 and name not in positive:
             value = -value
-        point[name] = value / 32 if name.startswith("p:") else value
+        point[name] = value / 32 if kind_of(name) == MOMENTUM else value
     return point
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.lowering import Assignment, assign, expand_powers
 from phigen.symbolic.expression import Expression, fold, raw, symbol, topological
+from phigen.symbolic.symbols import WORK, Symbol
 
 
 @dataclass(frozen=True)
@@ -27,6 +28,12 @@ class Code:
     stores: tuple[Store, ...]
     used: frozenset[str]
 
+    @property
+    def kept(self) -> list[int]:
+        """The entries of the workspace that it fills."""
+        targets = [a.target for a in self.assignments]
+        return [int(t.key[0]) for t in targets if isinstance(t, Symbol) and t.kind == WORK]
+
 
 def lower(kernel: Kernel) -> Code:
     """The kernel as assignments and stores."""
@@ -44,8 +51,8 @@ def lower(kernel: Kernel) -> Code:
 def parts(code: Code, size: int) -> list[Code]:
     """The code cut into pieces of at most ``size`` statements, each store as early as its value is known.
 
-    Long functions compile in quadratic time. A temporary ``t:k`` that a later piece reads becomes ``w:j``, an
-    entry of a workspace array.
+    Long functions compile in quadratic time. A temporary that a later piece reads becomes an entry of a workspace
+    array, a symbol of the kind `WORK`.
     """
     if len(code.assignments) + len(code.stores) <= size:
         return [code]
@@ -62,7 +69,7 @@ def parts(code: Code, size: int) -> list[Code]:
     for k, chunk in enumerate(chunks):
         for n in _reads([s.value for s in chunk]):
             if n in home and home[n] != k and n not in crossing:
-                crossing[n] = f"w:{len(crossing)}"
+                crossing[n] = Symbol(WORK, len(crossing))
     return [_renamed(chunk, crossing) for chunk in chunks]
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 
+from phigen.symbolic.symbols import TEMPORARY, Symbol
+
 _C = """auto break case char const continue default do double else enum extern float for goto if inline int long
 register restrict return short signed sizeof static struct switch typedef union unsigned void volatile while
 _Bool _Complex _Imaginary alignas alignof and and_eq asm bitand bitor bool catch char8_t char16_t char32_t class compl
@@ -39,11 +41,12 @@ class Scope:
         self._given: dict[str, str] = {}
 
     def __getitem__(self, name: str) -> str:
-        """The identifier of a symbol; a name like ``t:12`` of phigen's own becomes ``t12``."""
+        """The identifier of a symbol; temporary 12 becomes ``t12``."""
         if name not in self._given:
-            wanted = name.replace(":", "") if re.fullmatch(r"t:\d+", name) else re.sub(r"\W", "_", name, flags=re.ASCII)
+            temporary = isinstance(name, Symbol) and name.kind == TEMPORARY
+            wanted = name.replace(":", "") if temporary else re.sub(r"\W", "_", name, flags=re.ASCII)
             # t12 is a temporary; a coordinate of that name gives way.
-            while wanted in self._taken or (re.fullmatch(r"t\d+", wanted) and ":" not in name):
+            while wanted in self._taken or (re.fullmatch(r"t\d+", wanted) and not temporary):
                 wanted += "_"
             self._taken.add(wanted)
             self._given[name] = wanted

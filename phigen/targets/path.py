@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 from phigen.scheme.lowering import expand_powers
 from phigen.scheme.path import Recurrences, Series, Term
 from phigen.scheme.program import Program
-from phigen.scheme.tangent import variation
 from phigen.symbolic.expression import Expression, symbols_of
+from phigen.symbolic.symbols import COEFFICIENT, FIXED, SERIES, Symbol, coefficient, kind_of, momentum, variation
 from phigen.targets.names import Scope
 from phigen.targets.printer import Printer
 
@@ -59,7 +59,7 @@ def tangent_program(program: Program) -> Program:
 def reads_coefficients(path: Recurrences) -> bool:
     """Whether some statement reads the table of coefficients."""
     roots = [*path.fixed, *(q.first for q in path.series), *(f for q in path.series for _, f in q.linear)]
-    return any(s.startswith("c:") for s in symbols_of(*roots))
+    return any(kind_of(s) == COEFFICIENT for s in symbols_of(*roots))
 
 
 def kinds(path: Recurrences) -> list[str]:
@@ -70,13 +70,13 @@ def kinds(path: Recurrences) -> list[str]:
 def _scope(program: Program, path: Recurrences, syntax: Syntax, series: str) -> Scope:
     scope = Scope(())
     for i, c in enumerate(program.coordinates):
-        scope.bind(f"p:{c}", syntax.covector.format(i=i))
+        scope.bind(momentum(c), syntax.covector.format(i=i))
     for i in range(program.step.coefficients):
-        scope.bind(f"c:{i}", f"coef[{i}]")
+        scope.bind(coefficient(i), f"coef[{i}]")
     for i in range(len(path.series)):
-        scope.bind(f"s:{i}", series.format(i=i))
+        scope.bind(Symbol(SERIES, i), series.format(i=i))
     for i in range(len(path.fixed)):
-        scope.bind(f"f:{i}", f"f{i}")
+        scope.bind(Symbol(FIXED, i), f"f{i}")
     return scope
 
 

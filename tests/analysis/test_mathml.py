@@ -30,9 +30,11 @@ from phigen.symbolic.expression import (
 )
 from phigen.symbolic.numeric import evaluate
 from phigen.symbolic.readable import expanded
+from phigen.symbolic.symbols import GAUGE, STEP, Symbol, momentum
 
-VALUES = {"x": 1.3, "y1": 0.7, "omega_2": 2.1, "prey": 0.4, "p:y1": 0.11, "gauge:C": 0.2, "lambda": 1.9}
-x, y, w, prey, p, lam = (symbol(n) for n in ("x", "y1", "omega_2", "prey", "p:y1", "lambda"))
+GAUGED = Symbol(GAUGE, "C")
+VALUES = {"x": 1.3, "y1": 0.7, "omega_2": 2.1, "prey": 0.4, momentum("y1"): 0.11, GAUGED: 0.2, "lambda": 1.9}
+x, y, w, prey, p, lam = (symbol(n) for n in ("x", "y1", "omega_2", "prey", momentum("y1"), "lambda"))
 HEAD = "phigen: 1\nname: t\ncoordinates: [x, y1, prey]\npoisson: {matrix: [[0, 0, 0], [0, 0, 0], [0, 0, 0]]}\n"
 
 
@@ -74,7 +76,7 @@ def test_functions_without_other_test():
         power(number(Fraction(3, 2)), Fraction(1, 2)), power(number(2), Fraction(1, 2)), sqrt(x) ** 3,
         call("exp", -x / y), call("sin", x) ** 2 * call("cos", x), call("exp", call("exp", x) / 10),
         power(call("exp", x), 3), raw("pow", (raw("pow", (x,), Fraction(2)),), Fraction(3)), lam * prey, prey * 2,
-        symbol("gauge:C") * x, 2 - x, x - 2, x + 1 - y + 1, (x - y) ** 2 - (y - x),
+        symbol(GAUGED) * x, 2 - x, x - 2, x + 1 - y + 1, (x - y) ** 2 - (y - x),
         -(x - y) * (x + y) * (x + 2 * y) / 3,
         raw("pow", (3 * x / y,), Fraction(-1)), raw("pow", (-2 * x,), Fraction(-2)), raw("pow", (1 / x,), Fraction(3)),
         -(x + y + w + prey + lam) / (2 * y), (x + y + w + prey) * 1, call("abs", x - 2 * y) * x,
@@ -126,8 +128,9 @@ def test_decimals_stay_decimals():
 
 @pytest.mark.parametrize(
     ("identifier", "shown"),
-    [("x", "x"), ("x12", "x_(12)"), ("omega_1", "ω_(1)"), ("p:x1", "p_(x_(1))"), ("gauge:C", "λ_(C)"), ("_a", "_a"),
-     ("gamma", "γ"), ("curlz", "curlz"), ("a_b_c", "a_(b_(c))"), ("h:", "h"), ("q1dot", "q1dot"), ("x_", "x_")],
+    [("x", "x"), ("x12", "x_(12)"), ("omega_1", "ω_(1)"), (momentum("x1"), "p_(x_(1))"), (GAUGED, "λ_(C)"),
+     ("_a", "_a"), ("gamma", "γ"), ("curlz", "curlz"), ("a_b_c", "a_(b_(c))"), (STEP, "h"),
+     ("q1dot", "q1dot"), ("x_", "x_")],
 )  # fmt: skip
 def test_name(identifier, shown):
     from mathml_value import text_of
@@ -135,7 +138,9 @@ def test_name(identifier, shown):
     assert text_of(ElementTree.fromstring(mathml.name(identifier))) == shown
 
 
-@pytest.mark.parametrize("name", ["<script>alert(1)</script>", "a&b", "</mi></math>", '"', "]]>", "p:<b>", "gauge:&"])
+@pytest.mark.parametrize(
+    "name", ["<script>alert(1)</script>", "a&b", "</mi></math>", '"', "]]>", momentum("<b>"), Symbol(GAUGE, "&")]
+)
 def test_no_name_breaks_the_markup(name):
     e = symbol(name) ** 2 + 1
     found = ElementTree.fromstring(mathml.math("".join(mathml.pieces(e))))

@@ -21,6 +21,7 @@ from phigen.runtime.solver import Solver
 from phigen.scheme.assemble import build_program
 from phigen.spec.model import Extras
 from phigen.symbolic.expression import substitute, symbol
+from phigen.symbolic.symbols import momentum
 
 TEXT = f"""phigen: 1
 name: t
@@ -118,7 +119,7 @@ def test_rk4_posing_as_the_step_is_found_out():
 def test_a_wrong_sign_of_the_quadratic_term_is_found_out():
     """α of the exponential bi-realisation, its terms of even degree in p with the other sign."""
     compilation = compilation_of()
-    names = {f"p:{c}": -symbol(f"p:{c}") for c in compilation.system.coordinates}
+    names = {momentum(c): -symbol(momentum(c)) for c in compilation.system.coordinates}
     wrong = tuple(-e for e in substitute(compilation.realisation.displacement, names))
     realisation = replace(compilation.realisation, displacement=wrong)
     found = (compilation.system, realisation, compilation.order, compilation.gauged, compilation.scheme)

@@ -6,6 +6,7 @@ from pathlib import Path
 import mpmath
 import numpy as np
 import pytest
+from phigen.symbolic.symbols import ELAPSED
 from support import (
     BODY,
     NAMES,
@@ -219,7 +220,7 @@ def closed_form(compilation, run, times, at):
     names = {**at.parameters, **{f"x0:{c}": v for c, v in zip(coordinates, at.x, strict=True)}}
     table = np.full((len(times), len(coordinates)), np.nan)
     for k, t in enumerate(times.tolist()):
-        found = values(list(formulas.values()), {**names, "t:": t})
+        found = values(list(formulas.values()), {**names, ELAPSED: t})
         for c, v in zip(formulas, found, strict=True):
             table[k, coordinates.index(c)] = float(v)
     return table

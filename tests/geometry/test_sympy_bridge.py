@@ -11,6 +11,7 @@ from phigen.geometry.sympy_bridge import expression, to_sympy
 from phigen.geometry.system import System
 from phigen.symbolic.expression import FUNCTIONS, call, symbol
 from phigen.symbolic.special import SPECIAL
+from phigen.symbolic.symbols import momentum
 from phigen.symbolic.verdict import PROVED, decide_zero
 
 x, y, z = sympy.symbols("x y z")
@@ -42,7 +43,7 @@ def test_every_function_goes_to_sympy_and_back(name):
 
 
 def test_arithmetic_goes_to_sympy_and_back():
-    u, v = symbol("u"), symbol("p:v")
+    u, v = symbol("u"), symbol(momentum("v"))
     e = (u - v) ** 3 / (1 + u * v) - 2 * u ** Fraction(1, 2) / 3
     (difference,) = [expression(to_sympy(e)) - e]
     assert "p_v" in str(difference)

@@ -7,11 +7,12 @@ from fractions import Fraction
 
 from phigen.geometry.shapes import coordinate_terms
 from phigen.symbolic.expression import ZERO, Expression, derivatives, number, substitute, symbol, total
+from phigen.symbolic.symbols import Symbol
 from phigen.symbolic.verdict import PROVED, decide_zero
 
 #: (a, b) with a < b → the coefficient of dz_a ∧ dz_b.
 Form = dict[tuple[int, int], Expression]
-TIME = "s:"
+TIME = Symbol("s")
 
 
 def canonical(n: int) -> Form:

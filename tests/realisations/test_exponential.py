@@ -16,6 +16,7 @@ from phigen.realisations.catalogue import realise
 from phigen.spec.model import BirealisationChoice
 from phigen.symbolic.expression import call, gradient, number, symbol, symbols_of, total
 from phigen.symbolic.numeric import evaluate_precisely
+from phigen.symbolic.symbols import momentum
 from phigen.symbolic.verdict import PROVED, REFUTED, decide_zero
 
 CAYLEY, EXPONENTIAL = BirealisationChoice("cayley"), BirealisationChoice("exponential")
@@ -73,7 +74,7 @@ def test_increment_is_the_hamiltonian_vector_field_of_the_covector(name, size):
 def test_so3_is_the_formula_of_the_mathematics_page():
     s = family("so", 3, -1)  # π(x)v = x × v
     x = [symbol(c) for c in s.coordinates]
-    p = [symbol(f"p:{c}") for c in s.coordinates]
+    p = [symbol(momentum(c)) for c in s.coordinates]
 
     def cross(u, v):
         return [u[(i + 1) % 3] * v[(i + 2) % 3] - u[(i + 2) % 3] * v[(i + 1) % 3] for i in range(3)]
@@ -98,14 +99,14 @@ def test_alpha_is_the_series_of_b_at_a_point(name, size):
     s = family(name, size)
     n = s.dimension
     point = {c: Fraction(3 * i + 1, 7) for i, c in enumerate(s.coordinates)}
-    covector = {f"p:{c}": Fraction((-1) ** i * (i + 1), 9) for i, c in enumerate(s.coordinates)}
+    covector = {momentum(c): Fraction((-1) ** i * (i + 1), 9) for i, c in enumerate(s.coordinates)}
     values = evaluate_precisely(realise(s, EXPONENTIAL).alpha, point | covector, 40)
     with mpmath.workdps(40):
         rows = [[mpmath.mpf(0)] * n for _ in range(n)]
         for i in range(n):
             for j in range(n):
                 for k, c in s.lie_algebra.bracket(i, j).items():
-                    v = c.value * covector[f"p:{s.coordinates[j]}"]
+                    v = c.value * covector[momentum(s.coordinates[j])]
                     rows[i][k] += mpmath.mpf(v.numerator) / v.denominator
         m = mpmath.matrix(rows)
         power = mpmath.matrix([mpmath.mpf(v.numerator) / v.denominator for v in point.values()])
@@ -184,5 +185,5 @@ def test_blocks_stay_apart():
     s = system("x y z u v w", "{brackets: {x: {y: -z, z: y}, y: {z: -x}, u: {v: w}}}")
     found = realise(s)
     for d in found.displacement[:3]:
-        assert set(symbols_of(d)) <= {*"xyz", "p:x", "p:y", "p:z"}
+        assert set(symbols_of(d)) <= {*"xyz", momentum("x"), momentum("y"), momentum("z")}
     assert found.displacement[5].is_zero

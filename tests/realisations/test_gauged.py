@@ -9,6 +9,7 @@ from phigen.realisations.axioms import check
 from phigen.realisations.catalogue import realise
 from phigen.spec.model import BirealisationChoice
 from phigen.symbolic.numeric import evaluate
+from phigen.symbolic.symbols import momentum
 from phigen.symbolic.verdict import CHECKED, PROVED
 
 GAUGED, KARASEV = BirealisationChoice("gauged"), BirealisationChoice("karasev")
@@ -53,7 +54,7 @@ def test_other_factors_hold_at_least_numerically(brackets):
 def test_a_log_canonical_tensor_gives_the_log_canonical_maps():
     s = tensor("x y z", "{x: {y: x*y, z: 2*x*z}, y: {z: y*z}}")
     assert realise(s).kind == "log-canonical"
-    point = {"x": 0.5, "y": 1.25, "z": -2.0, "p:x": 0.25, "p:y": -0.125, "p:z": 0.3}
+    point = {"x": 0.5, "y": 1.25, "z": -2.0, momentum("x"): 0.25, momentum("y"): -0.125, momentum("z"): 0.3}
     pairs = [(r.alpha, r.beta, r.increment) for r in (realise(s, GAUGED), realise(s))]
     for one, other in zip(*pairs, strict=True):
         assert evaluate(one, point) == pytest.approx(evaluate(other, point), rel=1e-14)
@@ -64,7 +65,7 @@ def test_the_displacement_is_the_flow_of_the_factor(factor):
     # β_x = x moved along ẋ = g(x) for the time ½u_x, u_x = p_y with {x, y} = g(x): by RK4 with small steps.
     s = tensor("x y", f"{{x: {{y: '{factor}'}}}}")
     found = realise(s, GAUGED)
-    start = {"x": 0.7, "y": 0.0, "p:x": 0.0, "p:y": 0.3, "a": 1.0, "b": 2.0, "c": 3.0}
+    start = {"x": 0.7, "y": 0.0, momentum("x"): 0.0, momentum("y"): 0.3, "a": 1.0, "b": 2.0, "c": 3.0}
     g = s.poisson[0][1]
 
     def slope(x):
@@ -83,7 +84,7 @@ def test_small_momenta_lose_no_digits():
     s = tensor("x y", "{x: {y: x**2 + b*x + a}}")
     found = realise(s)
     for size in (1e-3, 1e-9, 1e-15):
-        point = {"x": 0.7, "y": 1.0, "p:x": 0.0, "p:y": size, "a": 1.0, "b": 2.0}
+        point = {"x": 0.7, "y": 1.0, momentum("x"): 0.0, momentum("y"): size, "a": 1.0, "b": 2.0}
         assert evaluate([found.increment[0]], point)[0] == pytest.approx(size * 2.89, rel=2 * size + 1e-15)
 
 

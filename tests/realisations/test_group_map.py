@@ -10,9 +10,10 @@ from phigen.realisations.catalogue import realise
 from phigen.spec import loads
 from phigen.spec.model import BirealisationChoice
 from phigen.symbolic.expression import call, symbol
+from phigen.symbolic.symbols import MATRIX
 from phigen.symbolic.verdict import PROVED, decide_zero
 
-P = symbol("P:")
+P = symbol(MATRIX)
 CAYLEY = (1 + P / 2) / (1 - P / 2)
 
 

@@ -11,6 +11,7 @@ from phigen.realisations.catalogue import realise
 from phigen.realisations.product import grouped
 from phigen.spec.model import BirealisationChoice
 from phigen.symbolic.expression import symbols_of
+from phigen.symbolic.symbols import momentum
 from phigen.symbolic.verdict import PROVED
 
 PRODUCT = BirealisationChoice("product")
@@ -40,7 +41,7 @@ def test_blocks_are_found_and_proved(coordinates, brackets, kinds):
     for indices in blocks(s.coordinates, s.poisson):
         own = {s.coordinates[i] for i in indices}
         for i in indices:
-            assert set(symbols_of(found.displacement[i])) <= own | {f"p:{c}" for c in own}
+            assert set(symbols_of(found.displacement[i])) <= own | {momentum(c) for c in own}
 
 
 def test_blocks_follow_brackets_and_what_they_depend_on():

@@ -34,6 +34,7 @@ from phigen.series.hamilton_jacobi import polynomial_series
 from phigen.spec import loads
 from phigen.spec.model import BirealisationChoice
 from phigen.symbolic.expression import ZERO, call, derivatives, gradient, number, substitute, symbol, total
+from phigen.symbolic.symbols import ELAPSED, momentum
 from phigen.symbolic.verdict import PROVED, REFUTED, decide_zero
 
 HALF = Fraction(1, 2)
@@ -66,8 +67,8 @@ def given(forces, **options):
 
 # -- the symplectic example of the paper -------------------------------------------------------------------------
 
-Q, P, A, B = (symbol(n) for n in ("q", "p", "p:q", "p:p"))  # q, p and the covector (ξ_q, ξ_p)
-Z = ("q", "p", "p:q", "p:p")
+Q, P, A, B = (symbol(n) for n in ("q", "p", momentum("q"), momentum("p")))  # q, p and the covector (ξ_q, ξ_p)
+Z = ("q", "p", momentum("q"), momentum("p"))
 PSI = [Q - HALF * B, P + HALF * A, A, B]
 
 
@@ -116,7 +117,7 @@ def test_psi_of_the_other_sign_is_refuted():
 
 def test_psi_is_not_the_identity_to_first_order_but_its_centred_part_is():
     # The paper says so of ψ; it moves x by −½πp. ψ₀, with ψ = Φ^{−½}∘ψ₀, begins in degree 2.
-    assert not same([derivatives([e], "p:p")[0] for e in PSI[:1]], [ZERO])
+    assert not same([derivatives([e], momentum("p"))[0] for e in PSI[:1]], [ZERO])
     for s in (system("x y z", SO3), system("x y z", CUBIC)):
         spray = make_spray(s, "flat")
         assert centred_form(spray, 2) == {1: spray.space.canonical()}
@@ -325,11 +326,11 @@ def test_flat_spray_is_karasevs_construction(coordinates, poisson):
     found = realise(s, replace(FLAT, degree=degree))
     powers = dict(zip(s.coordinates, karasev.series(s, degree), strict=True))
     for c, mine in zip(s.coordinates, found.alpha, strict=True):
-        scaled = {name: symbol("t:") * symbol(name) for name in found.covector}
+        scaled = {name: symbol(ELAPSED) * symbol(name) for name in found.covector}
         e = substitute([mine - powers[c]], scaled)[0]
         for _ in range(degree + 1):  # the coefficients of t⁰ … t^degree
-            assert decide_zero("", [("", substitute([e], {"t:": ZERO})[0])]).verdict == PROVED
-            e = derivatives([e], "t:")[0]
+            assert decide_zero("", [("", substitute([e], {ELAPSED: ZERO})[0])]).verdict == PROVED
+            e = derivatives([e], ELAPSED)[0]
 
 
 def test_flat_spray_of_so3_is_the_exponential_series():
@@ -456,7 +457,7 @@ def test_sprays_of_the_wrong_size_or_with_unknown_symbols_are_refused():
     with pytest.raises(SpecError, match="spray has 1 components for 2 coordinates"):
         realise(s, BirealisationChoice("spray", spray=(ZERO,)))
     with pytest.raises(SpecError, match="spray uses p_z"):
-        realise(s, BirealisationChoice("spray", spray=(ZERO, symbol("p:z") ** 2)))
+        realise(s, BirealisationChoice("spray", spray=(ZERO, symbol(momentum("z")) ** 2)))
     with pytest.raises(SpecError, match="unknown spray 'round'"):
         realise(s, BirealisationChoice("spray", spray="round"))
 

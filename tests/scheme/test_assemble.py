@@ -13,6 +13,7 @@ from phigen.scheme.order import Order, plan_order
 from phigen.scheme.staging import Coefficients
 from phigen.scheme.steps import Explicit, Newton
 from phigen.series.hamilton_jacobi import graph_series
+from phigen.symbolic.symbols import coefficient
 
 
 @pytest.mark.parametrize(
@@ -73,7 +74,7 @@ def test_generating_function_is_the_cheapest_of_its_forms_and_all_are_equal(name
 def evaluated(form, at):
     """Gradient and Hessian of a form at a point."""
     table = values(form.coefficients.values, at)
-    known = {**at, **{f"c:{k}": v for k, v in enumerate(table)}}
+    known = {**at, **{coefficient(k): v for k, v in enumerate(table)}}
     return values([*form.slope, *(e for row in form.hessian for e in row)], known)
 
 
@@ -92,7 +93,7 @@ def test_collected_polynomials_differentiate_like_the_tower():
         for j, c in enumerate(coordinates):
             table = Coefficients(["mu", STEP])
             mine = ring.expression(ring.derivative(terms, j), table)
-            at |= {f"c:{k}": v for k, v in enumerate(values(table.values, at))}
+            at |= {coefficient(k): v for k, v in enumerate(values(table.values, at))}
             theirs = series.tower.expression(series.tower.derivative(series.terms[2], c))
             assert mpmath.almosteq(*values([mine, theirs], at), mpmath.mpf(10) ** -25)
 

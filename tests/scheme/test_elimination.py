@@ -7,6 +7,7 @@ from support import values
 from phigen.scheme.elimination import elimination, factorise, pivot_order
 from phigen.symbolic.expression import symbol
 from phigen.symbolic.numeric import evaluate
+from phigen.symbolic.symbols import Symbol
 
 
 def ring(n):
@@ -40,8 +41,8 @@ def test_elimination_solves_linear_systems(name):
             for j in range(n):
                 matrix[i, j] = entry(i, j) if pattern[i][j] else 0
         side = mpmath.matrix([mpmath.mpf(2 * i - 3) / 7 for i in range(n)])
-        at = {f"J:{i}:{j}": matrix[i, j] for i in range(n) for j in range(n) if pattern[i][j]}
-        at |= {f"r:{i}": side[i] for i in range(n)}
+        at = {Symbol("J", i, j): matrix[i, j] for i in range(n) for j in range(n) if pattern[i][j]}
+        at |= {Symbol("r", i): side[i] for i in range(n)}
         solution, reciprocals = elimination(pattern)
         found = mpmath.matrix(values(solution, at))
         assert mpmath.norm(matrix * found - side) < mpmath.mpf(10) ** -25
@@ -55,9 +56,10 @@ def test_elimination_solves_linear_systems(name):
 def test_factors_solve_as_elimination_does(name):
     factors = factorise(PATTERNS[name])
     n = len(PATTERNS[name])
-    at = {f"J:{i}:{j}": float(entry(i, j)) for i in range(n) for j in range(n)} | {f"r:{i}": i - 2.5 for i in range(n)}
+    at = {Symbol("J", i, j): float(entry(i, j)) for i in range(n) for j in range(n)}
+    at |= {Symbol("r", i): i - 2.5 for i in range(n)}
     kept = dict(zip([str(e.value) for e in factors.named("f").values], evaluate(list(factors.values), at), strict=True))
-    side = [symbol(f"r:{i}") for i in range(n)]
+    side = [symbol(Symbol("r", i)) for i in range(n)]
     assert evaluate(factors.named("f").solved(side), at | kept) == pytest.approx(
         evaluate(elimination(PATTERNS[name])[0], at), rel=1e-13
     )

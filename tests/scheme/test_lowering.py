@@ -11,6 +11,7 @@ from support import NAMES, compile_text, compiled, symbols, values
 from phigen.scheme.lowering import LONGEST, assign, cost, expand_powers, operation_counts
 from phigen.scheme.staging import Coefficients
 from phigen.symbolic.expression import FUNCTIONS, number, power, sqrt, symbols_of, topological
+from phigen.symbolic.symbols import STEP, coefficient
 from phigen.targets.printer import Printer
 
 x, y, a = symbols("x y a")
@@ -110,7 +111,7 @@ def test_assignments_compute_the_roots(name):
 def test_the_step_reads_neither_parameters_nor_step_size(name):
     """Everything that does not depend on the state is a coefficient, computed by prepare."""
     program = compiled(name).program
-    static = {p.name for p in program.parameters} | {"h:"}
+    static = {p.name for p in program.parameters} | {STEP}
     for kernel in program.step.kernels:
         assert kernel is program.step.prepare or not static & set(symbols_of(*kernel.roots))
     assert not set(program.coordinates) & set(symbols_of(*program.step.prepare.roots))
@@ -123,7 +124,7 @@ def test_hoisting_keeps_values_and_takes_the_largest_static_parts():
     assert not {"a"} & set(symbols_of(*hoisted))
     with mpmath.workdps(30):
         at = {"x": mpmath.mpf(2), "y": mpmath.mpf(3), "a": mpmath.mpf(5)}
-        at |= {f"c:{k}": v for k, v in enumerate(values(table.values, at))}
+        at |= {coefficient(k): v for k, v in enumerate(values(table.values, at))}
         assert values(hoisted, at) == values(roots, at)
     assert len(table.values) == 4  # a² + 1, √a, a, a + 1; the number 3 stays where it is
 

@@ -10,10 +10,11 @@ from support import BODY, NAMES, SPECIES, compile_text, compiled, series_of, sym
 
 from phigen.series.hamilton_jacobi import graph_series, polynomial_series, residual
 from phigen.symbolic.expression import ONE, PI, ZERO, Expression, call, number, power, sqrt, symbol
+from phigen.symbolic.symbols import momentum
 from phigen.symbolic.tower import Tower
 
 q, p, a = symbols("q p p:q")
-b = symbol("p:p")
+b = symbol(momentum("p"))
 CAYLEY = "birealisation: cayley\norder: 2\n"
 HALF = number(Fraction(1, 2))
 MIDPOINT = (q - HALF * b, p + HALF * a)

@@ -13,7 +13,8 @@ from phigen.analysis.arrays import evaluate
 from phigen.compiler import compile_spec
 from phigen.realisations import karasev
 from phigen.scheme.discretisation import formal_alpha
-from phigen.series.modified import modified_series, time_dependent
+from phigen.series.modified import FRACTION, modified_series, time_dependent
+from phigen.symbolic.symbols import ELAPSED
 from phigen.symbolic.tower import rational
 
 SWING = "coordinates: [q, p]\npoisson: {canonical: {q: [q], p: [p]}}\nhamiltonian: (q**2 + p**2)/2\n"
@@ -48,7 +49,7 @@ def test_symplectic_euler_for_the_harmonic_oscillator():
     """H̃ = arcsin(h/2)/(h/2)/√(1 − h²/4) (H ∓ h qp/2): the invariant ellipse, run through with the right period."""
     found = modified(compile_text(f"{SWING}order: 1\nbirealisation: canonical-euler\n"), 6)
     h = 0.3
-    at = {"q": 0.7, "p": -0.4, "sigma:": 0.0}
+    at = {"q": 0.7, "p": -0.4, FRACTION: 0.0}
     value = sum(h**j * float(evaluate([found.tower.expression(t)], at)[0]) for j, t in enumerate(found.terms))
     factor = 2 / h * math.asin(h / 2) / math.sqrt(1 - h * h / 4)
     both = [factor * ((0.49 + 0.16) / 2 + sign * h / 2 * 0.7 * -0.4) for sign in (1, -1)]
@@ -110,8 +111,8 @@ def test_constant_to_higher_order_for_each_term(name, order):
 @precisely
 def test_time_dependent_hamiltonian_generates_the_steps_of_all_sizes():
     compilation = compile_text(f"{BODY}order: 2\n")
-    series = series_of(compilation.system, compilation.realisation, 1, ("t:",))
-    function = time_dependent(series, "t:")
+    series = series_of(compilation.system, compilation.realisation, 1, (ELAPSED,))
+    function = time_dependent(series, ELAPSED)
     coordinates, t, width = compilation.system.coordinates, mpmath.mpf(1) / 5, mpmath.mpf(10) ** -12
     x = [mpmath.mpf(v) / 10 for v in (3, 9, -4)]
 
@@ -126,7 +127,7 @@ def test_time_dependent_hamiltonian_generates_the_steps_of_all_sizes():
     step = PreciseStep(compilation, {}, Fraction(1, 5))
 
     def hamiltonian(state):
-        return values([function], {"t:": t, **dict(zip(coordinates, point(step, state), strict=True))})[0]
+        return values([function], {ELAPSED: t, **dict(zip(coordinates, point(step, state), strict=True))})[0]
 
     slope = mpmath.matrix(3, 1)
     for j in range(3):

@@ -16,6 +16,7 @@ from phigen.spec import load, loads, starter
 from phigen.spec.model import CanonicalForm, LieAlgebraForm, LogCanonicalForm, MatrixForm, NambuForm, PoissonForm, Spec
 from phigen.spec.names import FAMILIES
 from phigen.symbolic.expression import ONE, ZERO, call, mul, neg, number, power, symbol, text
+from phigen.symbolic.symbols import ELAPSED, initial, momentum
 
 X1, X2, X3 = (symbol(f"x{i}") for i in (1, 2, 3))
 
@@ -118,8 +119,8 @@ def test_definitions_are_substituted() -> None:
 def test_momenta_of_a_custom_birealisation_are_symbols_of_their_own() -> None:
     halves = "[x1 - p_x1/2, x2, x3]", "[x1 + p_x1/2, x2, x3]"
     found = spec(birealisation=f"{{kind: custom, alpha: {halves[0]}, beta: {halves[1]}}}").birealisation
-    assert found.alpha == (X1 - symbol("p:x1") / 2, X2, X3)
-    assert found.beta == (X1 + symbol("p:x1") / 2, X2, X3)
+    assert found.alpha == (X1 - symbol(momentum("x1")) / 2, X2, X3)
+    assert found.beta == (X1 + symbol(momentum("x1")) / 2, X2, X3)
 
 
 def test_a_spray_is_a_name_or_quadratic_forms_in_the_momenta() -> None:
@@ -155,7 +156,7 @@ def test_initial_values_by_name_are_put_in_order() -> None:
 
 def test_exact_solution_uses_time_and_initial_values() -> None:
     run = spec(parameters="{w: 1}", runs=f"{{a: {{{RUN}, steps: 1, exact: {{x1: x0_x1*cos(w*t)}}}}}}").runs["a"]
-    assert run.exact == {"x1": mul(symbol("x0:x1"), call("cos", mul(symbol("w"), symbol("t:"))))}
+    assert run.exact == {"x1": mul(symbol(initial("x1")), call("cos", mul(symbol("w"), symbol(ELAPSED))))}
 
 
 def test_references_may_be_one_or_many() -> None:

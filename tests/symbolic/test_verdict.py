@@ -7,6 +7,7 @@ from fractions import Fraction
 import pytest
 
 from phigen.symbolic.expression import PI, call, number, power, sqrt, symbol
+from phigen.symbolic.symbols import GAUGE, Symbol, momentum
 from phigen.symbolic.verdict import CHECKED, PROVED, REFUTED, UNDECIDED, decide_zero, sample_point
 
 x, y, a = symbol("x"), symbol("y"), symbol("a")
@@ -39,8 +40,8 @@ def test_nonzero_residual_is_refuted_with_label_point_and_residual():
         ((x**3 + x * y**2) * power(x**2 + y**2, Fraction(-3, 2)), "x/sqrt(x**2 + y**2)"),
         (x * (x + 1) / (x + 2) + 2 * (x + 1) / (x + 2), "x + 1"),
         (sqrt(x + 1) ** 3 - x * sqrt(x + 1) - y, "-y + sqrt(1 + x)"),
-        (symbol("p:x") * number(Fraction(1, 3)) * (y * a), "a*p_x*y/3"),
-        (symbol("gauge:C") - x, "λ_C - x"),
+        (symbol(momentum("x")) * number(Fraction(1, 3)) * (y * a), "a*p_x*y/3"),
+        (symbol(Symbol(GAUGE, "C")) - x, "λ_C - x"),
     ],
 )
 def test_residual_is_simplified_without_a_change_of_value_and_in_the_names_of_specs(residual, shown):
@@ -98,7 +99,8 @@ def test_sample_points_are_moderate_rationals(index):
 
 def test_covectors_are_sampled_near_zero():
     # A bi-realisation lives near p = 0; far from it a root may be on its other branch.
-    assert all(abs(v) <= Fraction(1, 8) for k in range(9) for v in sample_point(["p:x", "p:y"], [], k).values())
+    covector = [momentum("x"), momentum("y")]
+    assert all(abs(v) <= Fraction(1, 8) for k in range(9) for v in sample_point(covector, [], k).values())
 
 
 def test_points_and_verdicts_do_not_depend_on_the_hash_seed():

@@ -13,6 +13,7 @@ from support import COMMAND, TARGETS, compile_text, files, solver
 from phigen.compiler import emit
 from phigen.scheme.steps import Explicit
 from phigen.spec.names import ARGUMENTS, SPEC_FUNCTIONS
+from phigen.symbolic.symbols import TEMPORARY, Symbol
 from phigen.targets.header import is_edited, plain
 from phigen.targets.names import C_RESERVED, PYTHON_RESERVED, Scope
 
@@ -147,12 +148,12 @@ def test_names_that_differ_by_the_underscore_that_saves_them_stay_apart(names, r
 
 def test_scope_gives_distinct_identifiers_that_are_not_reserved():
     scope = Scope(C_RESERVED)
-    names = ["int", "int_", "t1", "t:1", "t:2", "x", "x_", "a:b", "a_b", "I"]
+    names = ["int", "int_", "t1", Symbol(TEMPORARY, 1), Symbol(TEMPORARY, 2), "x", "x_", Symbol("a", "b"), "a_b", "I"]
     given = [scope[n] for n in names]
     assert len(set(given)) == len(names)
     assert not set(given) & C_RESERVED
     assert all(re.fullmatch(r"[A-Za-z_]\w*", g) for g in given)
-    assert scope["t:1"] == "t1"
+    assert scope[Symbol(TEMPORARY, 1)] == "t1"
     assert [scope[n] for n in names] == given
 
 

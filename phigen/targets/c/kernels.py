@@ -10,6 +10,7 @@ from phigen.scheme.kernel import Kernel
 from phigen.scheme.program import Program
 from phigen.symbolic.entire import ENTIRE
 from phigen.symbolic.special import SPECIAL
+from phigen.symbolic.symbols import WORK, Symbol, kind_of
 from phigen.targets.code import Code, lower, parts
 from phigen.targets.header import plain
 from phigen.targets.names import C_RESERVED, Scope
@@ -60,7 +61,7 @@ def function(
     are numbers. What is always zero is not stored if ``sparse``. ``functions`` are the names of those that it calls.
     """
     pieces = parts(lower(kernel), LONGEST_FUNCTION)
-    workspace = 1 + max((int(a.target[2:]) for p in pieces for a in p.assignments if a.target[:2] == "w:"), default=0)
+    workspace = 1 + max((k for p in pieces for k in p.kept), default=0)
     if functions is None:
         functions = lane_calls(program) if lanes else FUNCTIONS
     name = f"{program.name}_{kernel.name}{'_lane' if single else '_lanes' if lanes else ''}"
@@ -183,15 +184,15 @@ def _body(program: Program, kernel: Kernel, form: Form, code: Code) -> list[str]
                 scope.bind(s, "h")
             elif array == "params":
                 scope.bind(s, f"params->{member[s]}")
-            elif ":" in s:
+            elif isinstance(s, Symbol):
                 scope.bind(s, f"{array}[{i}]{form.lane(array)}")
             else:
                 lines.append(f"    const double {scope[s]} = {array}[{i}]{form.lane(array)};")
     for k in range(form.workspace):
-        scope.bind(f"w:{k}", f"work[{k}]{form.lane('work')}")
+        scope.bind(Symbol(WORK, k), f"work[{k}]{form.lane('work')}")
     show = printer(scope, form.functions)
     for a in code.assignments:
-        declare = "" if a.target.startswith("w:") else "const double "
+        declare = "" if kind_of(a.target) == WORK else "const double "
         lines.append(f"    {declare}{scope[a.target]} = {show(a.value)};")
     stores = [s for s in code.stores if not (form.sparse and s.value.is_zero)]
     filled = {s.array for s in stores}

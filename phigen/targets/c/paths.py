@@ -10,8 +10,8 @@ from phigen.scheme.lowering import expand_powers
 from phigen.scheme.path import Entry, PathSlopes, Recurrences, Series, Term
 from phigen.scheme.program import Program
 from phigen.scheme.steps import Path, PathLanes
-from phigen.series.hamilton_jacobi import momentum
 from phigen.symbolic.expression import Expression, substitute, symbol
+from phigen.symbolic.symbols import FIXED, SERIES, Symbol, coefficient, momentum
 from phigen.targets.c.kernels import FUNCTIONS, each_lane, printer
 from phigen.targets.names import Scope
 from phigen.targets.rendering import render
@@ -59,7 +59,7 @@ def kernels(program: Program, step: Path, lanes: PathLanes) -> list[Kernel]:
     path, slopes, curvature, coordinates = step.recurrences, lanes.slopes, lanes.curvature, program.coordinates
     coef, covector = curvature.inputs["coef"], tuple(momentum(c) for c in coordinates)
     values = _resolved(path.series, path.fixed, {})
-    base = {f"s:{i}" for i in range(len(path.series))} | {f"f:{i}" for i in range(len(path.fixed))}
+    base = [*_symbols(SERIES, path.series), *_symbols(FIXED, path.fixed)]
     further = _resolved(slopes.series, slopes.fixed, {s: symbol(s) for s in base}, len(path.series), len(path.fixed))
     return [
         curvature,
@@ -76,8 +76,8 @@ def kernels(program: Program, step: Path, lanes: PathLanes) -> list[Kernel]:
             {
                 "coef": coef,
                 "p": covector,
-                "value": tuple(f"s:{i}" for i in range(len(path.series))),
-                "fixed": tuple(f"f:{i}" for i in range(len(path.fixed))),
+                "value": _symbols(SERIES, path.series),
+                "fixed": _symbols(FIXED, path.fixed),
             },
             (Output("slope", further[0]), Output("slope_fixed", further[1])),
         ),
@@ -118,6 +118,11 @@ def pieces(program: Program, step: Path, lanes: PathLanes, values: Mapping[str, 
     return [render("c", f"{template}.c", own) for template in TEMPLATES]
 
 
+def _symbols(kind: str, values: Sequence[object]) -> tuple[Symbol, ...]:
+    """A symbol for each of the values."""
+    return tuple(Symbol(kind, i) for i in range(len(values)))
+
+
 def _resolved(
     series: Sequence[Series],
     fixed: Sequence[Expression],
@@ -126,11 +131,11 @@ def _resolved(
     first_fixed: int = 0,
 ) -> tuple[tuple[Expression, ...], tuple[Expression, ...]]:
     """The first coefficients as expressions in what is known, with no symbols for one another."""
-    found = dict(known) | {f"f:{first_fixed + i}": e for i, e in enumerate(fixed)}
+    found = dict(known) | {Symbol(FIXED, first_fixed + i): e for i, e in enumerate(fixed)}
     values = []
     for i, q in enumerate(series):
         (value,) = substitute([q.first], found)
-        found[f"s:{first + i}"] = value
+        found[Symbol(SERIES, first + i)] = value
         values.append(value)
     return tuple(values), tuple(fixed)
 
@@ -144,12 +149,12 @@ class _Show:
         for i, c in enumerate(program.coordinates):
             scope.bind(momentum(c), f"e->p[{i}][lane]")
         for i in range(program.step.coefficients):
-            scope.bind(f"c:{i}", f"coef[{i}][lane]")
+            scope.bind(coefficient(i), f"coef[{i}][lane]")
         for i in range(len(path.series) + len(slopes.series)):
-            scope.bind(f"s:{i}", f"{self.series(i)}[0][lane]")
+            scope.bind(Symbol(SERIES, i), f"{self.series(i)}[0][lane]")
         for i in range(len(path.fixed) + len(slopes.fixed)):
             own = i - len(path.fixed)
-            scope.bind(f"f:{i}", f"e->fixed[{i}][lane]" if own < 0 else f"e->slope_fixed[{own}][lane]")
+            scope.bind(Symbol(FIXED, i), f"e->fixed[{i}][lane]" if own < 0 else f"e->slope_fixed[{own}][lane]")
         self._printer = printer(scope, FUNCTIONS)
 
     def series(self, i: int) -> str:

@@ -12,6 +12,7 @@ from phigen.scheme.steps import PLAUSIBLE, Explicit, Implicit, InnerSolve, Newto
 from phigen.symbolic.entire import ENTIRE
 from phigen.symbolic.expression import Expression
 from phigen.symbolic.special import SPECIAL
+from phigen.symbolic.symbols import Symbol
 from phigen.targets import special
 from phigen.targets.code import Code, lower
 from phigen.targets.header import CHECKSUM, checksum, header_lines, plain
@@ -199,7 +200,7 @@ def _bindings(kernel: Kernel, code: Code, scope: Scope) -> list[str]:
                 scope.bind(s, "h")
             elif array == "params":
                 lines.append(f'    {scope[s]} = parameters["{s}"]')
-            elif ":" in s:
+            elif isinstance(s, Symbol):
                 scope.bind(s, f"{array}[{i}]")
             else:
                 lines.append(f"    {scope[s]} = {array}[..., {i}]")

@@ -1,0 +1,68 @@
+"""The names of symbols: plain text for those of a spec, `Symbol` for those of phigen's own."""
+
+from __future__ import annotations
+
+from typing import Any
+
+#: Kinds that several modules tell apart. A kind without keys has one symbol only, such as the step size.
+MOMENTUM, VARIATION, GAUGE = "p", "v", "gauge"
+COEFFICIENT, SERIES, FIXED = "c", "s", "f"
+TEMPORARY, WORK, PART = "t", "w", "part"
+
+
+class Symbol(str):
+    """A name of phigen's own: a kind, and a key that tells it from others of that kind.
+
+    Its text, such as ``p:x1``, ``c:3`` or ``h:``, orders symbols and shows them; nothing reads it back. The colon,
+    which no name of a spec can hold, keeps it apart from the names of the user.
+    """
+
+    __slots__ = ("key", "kind")
+
+    kind: str
+    key: tuple[str | int, ...]
+
+    def __new__(cls, kind: str, *key: str | int) -> Symbol:
+        made = super().__new__(cls, f"{kind}:{':'.join(map(str, key))}")
+        made.kind, made.key = kind, key
+        return made
+
+    def __getnewargs__(self) -> tuple[Any, ...]:
+        return (self.kind, *self.key)
+
+
+#: The size of a step, or the time of a flow; the time since the start; a matrix Σ p_i E_i.
+STEP, ELAPSED, MATRIX = Symbol("h"), Symbol("time"), Symbol("P")
+
+
+def momentum(name: str) -> Symbol:
+    """The symbol of the covector component that belongs to a coordinate."""
+    return Symbol(MOMENTUM, name)
+
+
+def initial(name: str) -> Symbol:
+    """The symbol of the value of a coordinate at the start."""
+    return Symbol("x0", name)
+
+
+def variation(name: str) -> Symbol:
+    """The symbol of the variation of a coordinate."""
+    return Symbol(VARIATION, name)
+
+
+def coefficient(k: int) -> Symbol:
+    """The symbol of a value that does not depend on the state."""
+    return Symbol(COEFFICIENT, k)
+
+
+def kind_of(name: str) -> str | None:
+    """The kind of a symbol of phigen's own; None for a name of the user."""
+    return name.kind if isinstance(name, Symbol) else None
+
+
+def plain(name: str) -> str:
+    """A name for readers: ``p_x1`` for the momentum of x1, as in specs, λ_C for the gauge of C, ``h`` for the step."""
+    if not isinstance(name, Symbol):
+        return name
+    kind = "λ" if name.kind == GAUGE else name.kind
+    return "_".join([kind, *(plain(k) if isinstance(k, str) else str(k) for k in name.key)])
