@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: b5b7e16e5cda88fbdd908452dcd9b81b8efcef29cc4622b8b5a26f5e4f9c95c7
+ * body-sha256: f862c654e593b2c5514331b3a349945bc941f03510965fdb1cd38fa834d5cd3b
  */
 #include "ablowitz_ladik3.h"
 
@@ -43,14 +43,14 @@ static void ablowitz_ladik3_generate(const double coef[3], const double y[6], do
                                      double jacobian[restrict 36])
 {
     const double x1 = y[0];
-    const double y1_ = y[1];
+    const double y1 = y[1];
     const double x2 = y[2];
     const double y2 = y[3];
     const double x3 = y[4];
     const double y3 = y[5];
     const double t1 = coef[1] * x2;
     const double t2 = coef[1] * x3;
-    const double t3 = y1_ * y1_;
+    const double t3 = y1 * y1;
     const double t4 = x1 * x1;
     const double t5 = 1.0 / (t3 + (-1.0 + t4));
     const double t6 = coef[1] * y3;
@@ -59,13 +59,13 @@ static void ablowitz_ladik3_generate(const double coef[3], const double y[6], do
     const double t9 = y2 * y2;
     const double t10 = x2 * x2;
     const double t11 = 1.0 / (t9 + (-1.0 + t10));
-    const double t12 = coef[1] * y1_;
+    const double t12 = coef[1] * y1;
     const double t13 = y3 * y3;
     const double t14 = x3 * x3;
     const double t15 = 1.0 / (t13 + (-1.0 + t14));
     const double t16 = 1.0 - t4;
     const double t17 = t3 - t16;
-    const double t18 = coef[2] * (x1 * y1_ * (t5 * t5));
+    const double t18 = coef[2] * (x1 * y1 * (t5 * t5));
     const double t19 = t16 - t3;
     const double t20 = 1.0 - t10;
     const double t21 = t20 - t9;
@@ -82,7 +82,7 @@ static void ablowitz_ladik3_generate(const double coef[3], const double y[6], do
     const double t32 = (-0.5) * (coef[1] * t17);
     const double t33 = coef[2] * (x3 * y3 * (t15 * t15));
     slope[0] = t1 + t2 + coef[0] * (x1 * t5);
-    slope[1] = t6 + t7 + coef[0] * (y1_ * t5);
+    slope[1] = t6 + t7 + coef[0] * (y1 * t5);
     slope[2] = t8 + t2 + coef[0] * (x2 * t11);
     slope[3] = t6 + t12 + coef[0] * (y2 * t11);
     slope[4] = t1 + t8 + coef[0] * (x3 * t15);
@@ -689,12 +689,12 @@ static void ablowitz_ladik3_energy(const ablowitz_ladik3_params *params, const d
 {
     (void)params;
     const double x1 = x[0];
-    const double y1_ = x[1];
+    const double y1 = x[1];
     const double x2 = x[2];
     const double y2 = x[3];
     const double x3 = x[4];
     const double y3 = x[5];
-    const double t1 = log(1.0 - x1 * x1 - y1_ * y1_) + (y1_ * y3 + (x1 * x3 + (y2 * y3 + (x2 * x3 + (x1 * x2 + y1_ * y2)))));
+    const double t1 = log(1.0 - x1 * x1 - y1 * y1) + (y1 * y3 + (x1 * x3 + (y2 * y3 + (x2 * x3 + (x1 * x2 + y1 * y2)))));
     energy[0] = log(1.0 - x3 * x3 - y3 * y3) + (log(1.0 - x2 * x2 - y2 * y2) + t1);
 }
 
@@ -713,13 +713,13 @@ static void ablowitz_ladik3_field(const ablowitz_ladik3_params *params, const do
 {
     (void)params;
     const double x1 = x[0];
-    const double y1_ = x[1];
+    const double y1 = x[1];
     const double x2 = x[2];
     const double y2 = x[3];
     const double x3 = x[4];
     const double y3 = x[5];
     const double t1 = 1.0 - x1 * x1;
-    const double t2 = y1_ * y1_;
+    const double t2 = y1 * y1;
     const double t3 = t1 - t2;
     const double t4 = 1.0 / t3;
     const double t5 = 1.0 - x2 * x2;
@@ -730,11 +730,11 @@ static void ablowitz_ladik3_field(const ablowitz_ladik3_params *params, const do
     const double t10 = y3 * y3;
     const double t11 = t9 - t10;
     const double t12 = 1.0 / t11;
-    out[0] = t3 * (y2 + y3 - 2.0 * (y1_ * t4));
+    out[0] = t3 * (y2 + y3 - 2.0 * (y1 * t4));
     out[1] = (t2 - t1) * (x2 + x3 - 2.0 * (x1 * t4));
-    out[2] = t7 * (y1_ + y3 - 2.0 * (y2 * t8));
+    out[2] = t7 * (y1 + y3 - 2.0 * (y2 * t8));
     out[3] = (t6 - t5) * (x1 + x3 - 2.0 * (x2 * t8));
-    out[4] = t11 * (y1_ + y2 - 2.0 * (y3 * t12));
+    out[4] = t11 * (y1 + y2 - 2.0 * (y3 * t12));
     out[5] = (t10 - t9) * (x1 + x2 - 2.0 * (x3 * t12));
 }
 

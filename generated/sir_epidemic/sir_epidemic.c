@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: ce74e93c2d503932b71f97b700cad6b04e2d1ca522ab09ea73504a54eff6954d
+ * body-sha256: 98c40602268a7967b8d692b15c3df5681971d0ce255a771f3f57b00ae26b845f
  */
 #include "sir_epidemic.h"
 
@@ -31,10 +31,10 @@ static const double sir_epidemic_fractions[1] = { 1.0 };
 /* everything that depends on parameters and step size only */
 static void sir_epidemic_prepare(const sir_epidemic_params *params, double h, double coef[restrict 4])
 {
-    const double t1 = params->gamma_ * h;
+    const double t1 = params->gamma * h;
     coef[0] = t1;
     coef[1] = -(params->beta * h);
-    coef[2] = (-1.0 / 12.0) * (h * (h * h) * (params->gamma_ * (params->beta * params->beta)));
+    coef[2] = (-1.0 / 12.0) * (h * (h * h) * (params->gamma * (params->beta * params->beta)));
     coef[3] = -t1;
 }
 
@@ -541,7 +541,7 @@ static int sir_epidemic_admissible(const sir_epidemic_params *params)
 {
     double coef[4];
     if (!(isfinite(params->beta) && params->beta > 0.0)) return 0;
-    if (!(isfinite(params->gamma_) && params->gamma_ > 0.0)) return 0;
+    if (!(isfinite(params->gamma) && params->gamma > 0.0)) return 0;
     sir_epidemic_prepare(params, 1e-100, coef);
     for (int k = 0; k < 4; ++k)
         if (!isfinite(coef[k])) return 0;
@@ -1984,7 +1984,7 @@ static void sir_epidemic_energy(const sir_epidemic_params *params, const double 
 {
     const double S = x[0];
     const double I_ = x[1];
-    energy[0] = params->gamma_ * log(S) - params->beta * (I_ + S);
+    energy[0] = params->gamma * log(S) - params->beta * (I_ + S);
 }
 
 /* the Casimirs */
@@ -2005,7 +2005,7 @@ static void sir_epidemic_field(const sir_epidemic_params *params, const double x
     const double I_ = x[1];
     const double t1 = I_ * S;
     const double t2 = params->beta * t1;
-    const double t3 = t1 * (params->gamma_ / S - params->beta);
+    const double t3 = t1 * (params->gamma / S - params->beta);
     out[0] = -t2;
     out[1] = -t3;
     out[2] = t2 + t3;

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: c731168aef2e7ec243d0025ddb565595279fb305c11cc6f278509ab9074002ca
+ * body-sha256: fa5a04a4e6437a86fbe5c2be093ca83dad21d10b93bd46fd4e90d1a793ece37b
  */
 #ifndef SIR_EPIDEMIC_H
 #define SIR_EPIDEMIC_H
@@ -33,7 +33,7 @@ extern "C" {
 
 typedef struct {
     double beta; /* contacts per unit of time that infect */
-    double gamma_; /* rate of recovery */
+    double gamma; /* rate of recovery */
 } sir_epidemic_params;
 
 extern const sir_epidemic_params sir_epidemic_default_params;

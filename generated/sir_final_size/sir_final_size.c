@@ -12,7 +12,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 104b98711727a3eea45ebb14a7ba4e363cc6e418b8a17ac1cb667cd22c2dffbb
+ * body-sha256: f8fa832931543fc3687d1349298714dc554189f9f37e10955300d5d7f909a553
  */
 #include "sir_final_size.h"
 
@@ -32,7 +32,7 @@ static void sir_final_size_prepare(const sir_final_size_params *params, double h
 {
     coef[0] = h;
     coef[1] = params->beta;
-    coef[2] = params->gamma_;
+    coef[2] = params->gamma;
 }
 
 /* p = grad S_h(y), and the Jacobian 1 - Hess S_h(y) pi(y) / 2 of the equation for p, up to O(h^2) */
@@ -543,7 +543,7 @@ static int sir_final_size_admissible(const sir_final_size_params *params)
 {
     double coef[3];
     if (!(isfinite(params->beta) && params->beta > 0.0)) return 0;
-    if (!(isfinite(params->gamma_) && params->gamma_ > 0.0)) return 0;
+    if (!(isfinite(params->gamma) && params->gamma > 0.0)) return 0;
     sir_final_size_prepare(params, 1e-100, coef);
     for (int k = 0; k < 3; ++k)
         if (!isfinite(coef[k])) return 0;
@@ -2010,7 +2010,7 @@ static void sir_final_size_casimir_values(const sir_final_size_params *params, c
 {
     const double S = x[0];
     const double I_ = x[1];
-    out[0] = params->beta * (I_ + S) - params->gamma_ * log(S);
+    out[0] = params->beta * (I_ + S) - params->gamma * log(S);
 }
 
 /* pi(x) grad H(x) */
@@ -2020,7 +2020,7 @@ static void sir_final_size_field(const sir_final_size_params *params, const doub
     const double S = x[0];
     const double I_ = x[1];
     const double t1 = I_ * (S * params->beta);
-    const double t2 = I_ * params->gamma_;
+    const double t2 = I_ * params->gamma;
     out[0] = -t1;
     out[1] = t1 - t2;
     out[2] = t1 + (t2 - t1);

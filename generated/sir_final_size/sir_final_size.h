@@ -12,7 +12,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 3cd5ea32adbcbd27dc27543630fc09e71694f1e30005a8255077215e8a71c0d1
+ * body-sha256: c218cd028fcb9d513453c030facdc5f9f6811dd0a98c0db61a831075ecbbedeb
  */
 #ifndef SIR_FINAL_SIZE_H
 #define SIR_FINAL_SIZE_H
@@ -32,7 +32,7 @@ extern "C" {
 
 typedef struct {
     double beta; /* contacts per unit of time that infect */
-    double gamma_; /* rate of recovery */
+    double gamma; /* rate of recovery */
 } sir_final_size_params;
 
 extern const sir_final_size_params sir_final_size_default_params;

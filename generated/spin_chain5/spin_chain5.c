@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 4af048f73f4c4e421c9a9010b676985f504e12a679cef91a69c6c94ed14795e4
+ * body-sha256: 400b64eeb1e2e27b368012ae1faee42bbf76a64aacdcbfc4e24b95818c37c74c
  */
 #include "spin_chain5.h"
 
@@ -203,7 +203,7 @@ spin_chain5_APART static void spin_chain5_linearise_part1(const double coef[33],
     (void)jacobian;
     (void)increment_jacobian;
     const double x1 = y[0];
-    const double y1_ = y[1];
+    const double y1 = y[1];
     const double z1 = y[2];
     const double x2 = y[3];
     const double y2 = y[4];
@@ -235,7 +235,7 @@ spin_chain5_APART static void spin_chain5_linearise_part1(const double coef[33],
     work[27] = coef[3] * y5;
     work[52] = coef[3] * y4;
     work[9] = work[27] + (coef[5] * y2 + work[52]);
-    const double t19 = y1_ * t4;
+    const double t19 = y1 * t4;
     const double t20 = coef[13] * y2;
     work[106] = t20 + coef[12] * y5;
     work[38] = y5 * z4;
@@ -259,7 +259,7 @@ spin_chain5_APART static void spin_chain5_linearise_part1(const double coef[33],
     work[148] = work[65] + (work[66] + (work[67] + work[147]));
     work[40] = coef[0] * z5;
     work[13] = coef[0] * z2;
-    work[80] = y1_ * t27;
+    work[80] = y1 * t27;
     work[81] = y3 * work[127];
     work[160] = y5 * t38;
     work[82] = y4 * work[137];
@@ -275,14 +275,14 @@ spin_chain5_APART static void spin_chain5_linearise_part1(const double coef[33],
     const double t55 = coef[6] * y2;
     work[131] = work[129] + t55;
     const double t57 = t53 + x3 * work[131];
-    work[120] = y3 * work[14] + (t50 + (y1_ * work[116] + t57));
+    work[120] = y3 * work[14] + (t50 + (y1 * work[116] + t57));
     work[7] = coef[3] * z5;
     work[23] = work[7] + (coef[5] * z2 + work[61]);
     const double t61 = coef[13] * z2;
     work[107] = coef[12] * z5 + t61;
     work[12] = coef[4] * work[38] + coef[3] * work[39];
     const double t64 = z1 * work[115] + (work[12] + z3 * work[131]);
-    work[125] = y3 * work[23] + (y1_ * work[107] + t64);
+    work[125] = y3 * work[23] + (y1 * work[107] + t64);
     work[114] = coef[7] * y5 + coef[8] * y2;
     work[76] = x1 * work[114];
     work[28] = coef[4] * y2;
@@ -292,7 +292,7 @@ spin_chain5_APART static void spin_chain5_linearise_part1(const double coef[33],
     work[47] = coef[1] * y5;
     work[142] = work[118] + work[47];
     work[79] = x4 * work[142];
-    work[53] = coef[11] * y1_;
+    work[53] = coef[11] * y1;
     const double t76 = work[53] + coef[2] * y4;
     work[154] = x5 * t76;
     work[155] = work[76] + (work[77] + (work[79] + work[154]));
@@ -303,20 +303,20 @@ spin_chain5_APART static void spin_chain5_linearise_part1(const double coef[33],
     work[60] = z4 * work[142];
     work[167] = z5 * t76;
     work[168] = work[58] + (work[59] + (work[60] + work[167]));
-    work[108] = x2 * work[120] + (z2 * work[125] + (x5 * work[155] + (work[48] + (work[34] + coef[10] * y1_) + z5 * work[168])));
+    work[108] = x2 * work[120] + (z2 * work[125] + (x5 * work[155] + (work[48] + (work[34] + coef[10] * y1) + z5 * work[168])));
     work[112] = work[108] * work[108];
     work[99] = coef[9] * x2 + coef[8] * x5;
     work[134] = coef[4] * x4;
     const double t89 = coef[6] * x2;
     work[132] = work[134] + t89;
     work[31] = coef[4] * work[43] + coef[3] * work[44];
-    const double t92 = y1_ * work[99] + (y3 * work[132] + work[31]);
+    const double t92 = y1 * work[99] + (y3 * work[132] + work[31]);
     work[122] = x3 * work[9] + (x1 * work[106] + t92);
     work[17] = coef[3] * work[36] + coef[4] * work[37];
     const double t95 = z1 * work[99] + (work[17] + z3 * work[132]);
     work[124] = x3 * work[23] + (x1 * work[107] + t95);
     work[98] = coef[8] * x2 + coef[7] * x5;
-    work[92] = y1_ * work[98];
+    work[92] = y1 * work[98];
     work[19] = coef[4] * x2;
     work[133] = work[19] + work[50];
     work[93] = y3 * work[133];
@@ -344,10 +344,10 @@ spin_chain5_APART static void spin_chain5_linearise_part1(const double coef[33],
     work[103] = x1 * work[101];
     work[102] = work[217] - work[103];
     work[110] = x1 * work[108];
-    work[175] = y1_ * work[109];
+    work[175] = y1 * work[109];
     work[111] = work[110] - work[175];
     work[105] = work[101] * work[102] - work[108] * work[111];
-    work[171] = y1_ * work[101];
+    work[171] = y1 * work[101];
     work[218] = z1 * work[108];
     work[172] = work[171] - work[218];
     work[169] = work[109] * work[111] - work[101] * work[172];
@@ -372,7 +372,7 @@ spin_chain5_APART static void spin_chain5_linearise_part1(const double coef[33],
     work[234] = coef[15] * y4 + coef[16] * y2;
     work[33] = z3 * work[234] + t24;
     work[247] = work[32] + (work[246] + work[33]);
-    work[2] = x1 * (x3 * work[239] + (x1 * t134 + t95)) + (y1_ * (y3 * work[239] + (y1_ * t134 + t64)) + (x3 * work[241] + (work[41] + (coef[17] * z2 + work[54]) + y3 * work[247])));
+    work[2] = x1 * (x3 * work[239] + (x1 * t134 + t95)) + (y1 * (y3 * work[239] + (y1 * t134 + t64)) + (x3 * work[241] + (work[41] + (coef[17] * z2 + work[54]) + y3 * work[247])));
     work[242] = work[20] + (coef[19] * x2 + work[50]);
     const double t154 = coef[20] * x5 + t6;
     work[29] = x1 * t147;
@@ -390,21 +390,21 @@ spin_chain5_APART static void spin_chain5_linearise_part1(const double coef[33],
     work[16] = x3 * work[235];
     work[248] = z3 * t158;
     work[249] = work[15] + (work[16] + (work[17] + work[248]));
-    work[0] = y1_ * (y3 * work[242] + (t50 + (y1_ * t154 + t57))) + (z1 * (z3 * work[242] + (t5 + (z1 * t154 + t14))) + (y3 * work[244] + (work[46] + (work[72] + coef[17] * x2) + z3 * work[249])));
+    work[0] = y1 * (y3 * work[242] + (t50 + (y1 * t154 + t57))) + (z1 * (z3 * work[242] + (t5 + (z1 * t154 + t14))) + (y3 * work[244] + (work[46] + (work[72] + coef[17] * x2) + z3 * work[249])));
     work[320] = z2 * work[0];
     work[226] = x2 * work[2];
     work[3] = work[320] - work[226];
     work[236] = work[27] + (coef[19] * y2 + work[52]);
     const double t174 = coef[20] * y5 + t20;
-    work[21] = y1_ * t136;
+    work[21] = y1 * t136;
     work[6] = coef[18] * y2;
     const double t177 = work[6] + coef[14] * y4;
     work[237] = x3 * t177;
     work[22] = y3 * work[245] + t53;
     work[238] = work[21] + (work[237] + work[22]);
     work[49] = coef[0] * y3;
-    work[87] = coef[0] * y1_;
-    work[10] = y1_ * t164;
+    work[87] = coef[0] * y1;
+    work[10] = y1 * t164;
     work[11] = y3 * work[235];
     work[250] = z3 * t177;
     work[251] = work[10] + (work[11] + (work[250] + work[12]));
@@ -431,7 +431,7 @@ spin_chain5_APART static void spin_chain5_linearise_part2(const double coef[33],
     (void)jacobian;
     (void)increment_jacobian;
     const double x1 = y[0];
-    const double y1_ = y[1];
+    const double y1 = y[1];
     const double z1 = y[2];
     const double x2 = y[3];
     const double y2 = y[4];
@@ -474,7 +474,7 @@ spin_chain5_APART static void spin_chain5_linearise_part2(const double coef[33],
     const double t214 = x5 * work[361];
     work[345] = t205 + (t207 + (work[344] + t214));
     const double t216 = coef[0] * z4;
-    const double t217 = y1_ * t204;
+    const double t217 = y1 * t204;
     const double t218 = y3 * t206;
     const double t219 = y5 * work[361];
     work[351] = y4 * t209;
@@ -483,7 +483,7 @@ spin_chain5_APART static void spin_chain5_linearise_part2(const double coef[33],
     work[327] = x2 * (z1 * work[14] + (work[15] + (work[16] + (work[17] + z3 * work[342])))) + t222;
     work[338] = work[18] + coef[26] * z4;
     const double t224 = work[19] + work[20];
-    const double t225 = y1_ * t224;
+    const double t225 = y1 * t224;
     work[336] = coef[23] * x4 + coef[15] * x2;
     const double t227 = y3 * work[336];
     const double t228 = coef[25] * x3;
@@ -509,7 +509,7 @@ spin_chain5_APART static void spin_chain5_linearise_part2(const double coef[33],
     work[341] = coef[15] * y2 + coef[23] * y4;
     const double t248 = x3 * work[341];
     const double t249 = coef[22] * y4;
-    work[263] = coef[4] * y1_;
+    work[263] = coef[4] * y1;
     work[364] = t249 + work[263];
     const double t252 = x5 * work[364];
     const double t253 = coef[25] * y3;
@@ -522,7 +522,7 @@ spin_chain5_APART static void spin_chain5_linearise_part2(const double coef[33],
     work[359] = z4 * t254;
     const double t261 = z5 * work[364];
     work[360] = t258 + (t259 + (work[359] + t261));
-    work[332] = x2 * (y1_ * work[14] + (work[29] + (work[30] + (work[31] + y3 * work[342])))) + (z2 * (y1_ * work[23] + (work[32] + (y3 * work[338] + work[33]))) + (x4 * work[350] + (work[88] + (coef[24] * y3 + work[34]) + z4 * work[360])));
+    work[332] = x2 * (y1 * work[14] + (work[29] + (work[30] + (work[31] + y3 * work[342])))) + (z2 * (y1 * work[23] + (work[32] + (y3 * work[338] + work[33]))) + (x4 * work[350] + (work[88] + (coef[24] * y3 + work[34]) + z4 * work[360])));
     work[334] = x3 * work[332];
     work[370] = y3 * work[333];
     work[335] = work[334] - work[370];
@@ -543,7 +543,7 @@ spin_chain5_APART static void spin_chain5_linearise_part2(const double coef[33],
     const double t280 = work[20] + (work[260] + work[353]);
     work[430] = coef[30] * x5 + t228;
     work[255] = coef[14] * y3;
-    work[348] = coef[3] * y1_;
+    work[348] = coef[3] * y1;
     const double t284 = work[27] + (work[255] + work[348]);
     work[424] = coef[30] * y5 + t253;
     const double t286 = work[35] + work[8];
@@ -554,7 +554,7 @@ spin_chain5_APART static void spin_chain5_linearise_part2(const double coef[33],
     const double t291 = work[19] + t231;
     work[74] = coef[27] * work[36] + coef[29] * work[37] + z3 * t291;
     work[431] = work[73] + (z1 * t290 + work[74]);
-    work[89] = y1_ * t286;
+    work[89] = y1 * t286;
     work[139] = coef[2] * y5;
     work[432] = coef[3] * y2;
     const double t297 = work[139] + work[432];
@@ -569,7 +569,7 @@ spin_chain5_APART static void spin_chain5_linearise_part2(const double coef[33],
     const double t305 = work[7] + (work[343] + work[254]);
     work[425] = t208 + coef[30] * z5;
     const double t307 = work[19] + work[42];
-    work[83] = y1_ * t307;
+    work[83] = y1 * t307;
     work[84] = x3 * t298;
     work[85] = coef[27] * work[43] + coef[29] * work[44];
     work[435] = x1 * t297 + (work[83] + (work[84] + work[85]));
@@ -587,11 +587,11 @@ spin_chain5_APART static void spin_chain5_linearise_part2(const double coef[33],
     const double t322 = work[28] + work[47];
     work[68] = x1 * t322;
     work[70] = coef[27] * work[44] + coef[29] * work[43] + y3 * t291;
-    work[433] = work[68] + (y1_ * t290 + work[70]);
+    work[433] = work[68] + (y1 * t290 + work[70]);
     const double t326 = z1 * t322;
     const double t327 = coef[29] * work[39] + coef[27] * work[38];
     const double t328 = y3 * t317;
-    work[438] = y1_ * t314 + (t326 + (t327 + t328));
+    work[438] = y1 * t314 + (t326 + (t327 + t328));
     const double t330 = z3 * (y2 * t305 + (t217 + (t218 + (y4 * work[425] + t219)))) + (x5 * work[433] + (work[48] + (work[49] + coef[28] * y4) + z5 * work[438]));
     work[414] = x3 * (y2 * t280 + (t225 + (t227 + (y4 * work[430] + t234)))) + t330;
     work[428] = work[414] * work[414];
@@ -615,7 +615,7 @@ spin_chain5_APART static void spin_chain5_linearise_part2(const double coef[33],
     work[91] = work[50] + (work[276] + work[144]);
     work[95] = work[51] + coef[32] * x4;
     work[138] = coef[3] * y3;
-    work[261] = coef[20] * y1_;
+    work[261] = coef[20] * y1;
     work[75] = work[52] + (work[138] + work[261]);
     work[78] = coef[32] * y4 + work[53];
     work[366] = coef[21] * x4;
@@ -623,7 +623,7 @@ spin_chain5_APART static void spin_chain5_linearise_part2(const double coef[33],
     work[363] = coef[21] * y4;
     work[69] = work[363] + work[432];
     const double t359 = x4 * (t315 + (t318 + (t316 + z3 * work[86]))) + (coef[31] * z5 + (work[54] + t216) + y4 * (t326 + (t328 + (z3 * work[69] + t327))));
-    work[97] = x1 * (z2 * work[91] + (work[55] + (work[56] + (z5 * work[95] + work[57])))) + (y1_ * (z2 * work[75] + (work[58] + (work[59] + (z5 * work[78] + work[60])))) + t359);
+    work[97] = x1 * (z2 * work[91] + (work[55] + (work[56] + (z5 * work[95] + work[57])))) + (y1 * (z2 * work[75] + (work[58] + (work[59] + (z5 * work[78] + work[60])))) + t359);
     work[96] = work[97] * work[97];
     work[135] = coef[3] * z3;
     work[262] = coef[20] * z1;
@@ -657,7 +657,7 @@ spin_chain5_APART static void spin_chain5_linearise_part3(const double coef[33],
                                                           double work[restrict 517])
 {
     const double x1 = y[0];
-    const double y1_ = y[1];
+    const double y1 = y[1];
     const double z1 = y[2];
     const double x2 = y[3];
     const double y2 = y[4];
@@ -675,7 +675,7 @@ spin_chain5_APART static void spin_chain5_linearise_part3(const double coef[33],
     work[362] = coef[21] * z4;
     const double t366 = work[362] + work[63];
     const double t367 = z1 * (x2 * work[64] + (work[65] + (work[66] + (work[67] + x5 * work[472])))) + (y4 * (work[68] + (x3 * work[69] + work[70])) + (coef[31] * x5 + (work[71] + work[72]) + z4 * (work[73] + (x3 * t366 + work[74]))));
-    work[454] = y1_ * (x2 * work[75] + (work[76] + (work[77] + (x5 * work[78] + work[79])))) + t367;
+    work[454] = y1 * (x2 * work[75] + (work[76] + (work[77] + (x5 * work[78] + work[79])))) + t367;
     work[507] = work[454] * work[454];
     const double t369 = z1 * (y2 * work[64] + (work[80] + (work[81] + (y5 * work[472] + work[82])))) + (x4 * (work[83] + (work[84] + (work[85] + y3 * work[86]))) + (coef[31] * y5 + (work[87] + work[88]) + z4 * (work[89] + (y3 * t366 + work[90]))));
     work[453] = x1 * (y2 * work[91] + (work[92] + (work[93] + (work[94] + y5 * work[95])))) + t369;
@@ -698,14 +698,14 @@ spin_chain5_APART static void spin_chain5_linearise_part3(const double coef[33],
     work[180] = z5 * work[98] + z2 * work[99];
     const double t387 = spin_chain5_phi1(work[100]);
     work[170] = work[101] * t387;
-    work[216] = 0.5 * y1_;
+    work[216] = 0.5 * y1;
     work[156] = (work[102] - work[103]) * work[104] + 2.0 * (work[105] * work[170]) - work[216];
     const double t391 = y2 * work[106];
     const double t392 = z2 * work[107];
     const double t393 = y5 * (coef[11] * y5);
     const double t394 = coef[10] + z5 * (coef[11] * z5);
     work[182] = t391 + (t392 + (t393 + t394));
-    work[214] = y1_ * work[108];
+    work[214] = y1 * work[108];
     work[173] = z1 * work[101];
     work[176] = work[109] * t387;
     work[157] = (work[214] + work[173]) * work[104] + 2.0 * (work[105] * work[176]);
@@ -725,15 +725,15 @@ spin_chain5_APART static void spin_chain5_linearise_part3(const double coef[33],
     work[228] = coef[13] * z1;
     const double t414 = work[228] + coef[5] * z3;
     work[186] = x2 * t414 + work[117];
-    work[233] = coef[9] * y1_ + coef[6] * y3;
+    work[233] = coef[9] * y1 + coef[6] * y3;
     const double t417 = y2 * work[233];
     const double t418 = z2 * (coef[6] * z3 + coef[9] * z1);
-    const double t419 = coef[8] * y1_;
+    const double t419 = coef[8] * y1;
     const double t420 = y5 * (work[118] + t419);
     const double t421 = coef[8] * z1;
     const double t422 = coef[0] + z5 * (work[119] + t421);
     work[188] = t417 + (t418 + (t420 + t422));
-    work[227] = coef[13] * y1_;
+    work[227] = coef[13] * y1;
     const double t425 = work[227] + coef[5] * y3;
     work[187] = x2 * t425 + work[120];
     work[189] = y2 * t414 + work[121];
@@ -790,7 +790,7 @@ spin_chain5_APART static void spin_chain5_linearise_part3(const double coef[33],
     work[149] = y2 * work[264];
     work[266] = work[128] + t421;
     work[150] = z2 * work[266];
-    work[474] = coef[7] * y1_ + coef[1] * y4;
+    work[474] = coef[7] * y1 + coef[1] * y4;
     work[151] = y5 * work[474];
     work[152] = coef[0] + z5 * (coef[7] * z1 + coef[1] * z4);
     increment[13] = work[449];
@@ -800,24 +800,24 @@ spin_chain5_APART static void spin_chain5_linearise_part3(const double coef[33],
     displacement[13] = work[488] * work[451] - 0.5 * work[449];
     displacement[14] = work[451] * work[509] - 0.5 * work[456];
     increment_jacobian[15] = z1 * work[182] - x1 * work[180] - work[101];
-    increment_jacobian[30] = x1 * work[181] - y1_ * work[182] + work[108];
+    increment_jacobian[30] = x1 * work[181] - y1 * work[182] + work[108];
     jacobian[0] = 1.0 + (work[180] * work[156] + (work[182] * work[157] + work[181] * work[158]) - (work[112] + work[113]) * work[104]);
     jacobian[1] = work[179] - work[178] + (work[183] * work[156] + (work[181] * work[157] + work[184] * work[158]));
-    increment_jacobian[1] = y1_ * work[183] - z1 * work[184] + work[101];
-    increment_jacobian[31] = x1 * work[184] - y1_ * work[181] - work[109];
+    increment_jacobian[1] = y1 * work[183] - z1 * work[184] + work[101];
+    increment_jacobian[31] = x1 * work[184] - y1 * work[181] - work[109];
     jacobian[2] = work[220] + work[219] + (work[213] * work[156] + (work[180] * work[157] + work[183] * work[158]));
-    increment_jacobian[2] = y1_ * work[213] - z1 * work[183] - work[108];
+    increment_jacobian[2] = y1 * work[213] - z1 * work[183] - work[108];
     increment_jacobian[17] = z1 * work[180] - x1 * work[213] + work[109];
     increment_jacobian[18] = z1 * work[188] - x1 * work[186];
     jacobian[3] = work[186] * work[156] + (work[188] * work[157] + work[187] * work[158]);
-    increment_jacobian[3] = y1_ * work[186] - z1 * work[187];
-    increment_jacobian[33] = x1 * work[187] - y1_ * work[188];
+    increment_jacobian[3] = y1 * work[186] - z1 * work[187];
+    increment_jacobian[33] = x1 * work[187] - y1 * work[188];
     increment_jacobian[77] = x2 * work[189] - y2 * work[186];
     increment_jacobian[19] = z1 * work[191] - x1 * work[189];
     increment_jacobian[75] = x2 * work[191] - y2 * work[188];
     jacobian[4] = work[189] * work[156] + (work[191] * work[157] + work[190] * work[158]);
-    increment_jacobian[4] = y1_ * work[189] - z1 * work[190];
-    increment_jacobian[34] = x1 * work[190] - y1_ * work[191];
+    increment_jacobian[4] = y1 * work[189] - z1 * work[190];
+    increment_jacobian[34] = x1 * work[190] - y1 * work[191];
     increment_jacobian[76] = x2 * work[190] - y2 * work[187];
     increment_jacobian[47] = y2 * work[192] - z2 * work[189];
     increment_jacobian[62] = z2 * work[186] - x2 * work[192];
@@ -825,20 +825,20 @@ spin_chain5_APART static void spin_chain5_linearise_part3(const double coef[33],
     increment_jacobian[45] = y2 * work[194] - z2 * work[191];
     increment_jacobian[60] = z2 * work[188] - x2 * work[194];
     jacobian[5] = work[192] * work[156] + (work[194] * work[157] + work[193] * work[158]);
-    increment_jacobian[5] = y1_ * work[192] - z1 * work[193];
-    increment_jacobian[35] = x1 * work[193] - y1_ * work[194];
+    increment_jacobian[5] = y1 * work[192] - z1 * work[193];
+    increment_jacobian[35] = x1 * work[193] - y1 * work[194];
     increment_jacobian[46] = y2 * work[193] - z2 * work[190];
     increment_jacobian[61] = z2 * work[187] - x2 * work[193];
     increment_jacobian[21] = z1 * work[197] - x1 * work[195];
     jacobian[6] = work[195] * work[156] + (work[197] * work[157] + work[196] * work[158]);
-    increment_jacobian[6] = y1_ * work[195] - z1 * work[196];
-    increment_jacobian[36] = x1 * work[196] - y1_ * work[197];
+    increment_jacobian[6] = y1 * work[195] - z1 * work[196];
+    increment_jacobian[36] = x1 * work[196] - y1 * work[197];
     increment_jacobian[122] = x3 * work[198] - y3 * work[195];
     increment_jacobian[22] = z1 * work[200] - x1 * work[198];
     increment_jacobian[120] = x3 * work[200] - y3 * work[197];
     jacobian[7] = work[198] * work[156] + (work[200] * work[157] + work[199] * work[158]);
-    increment_jacobian[7] = y1_ * work[198] - z1 * work[199];
-    increment_jacobian[37] = x1 * work[199] - y1_ * work[200];
+    increment_jacobian[7] = y1 * work[198] - z1 * work[199];
+    increment_jacobian[37] = x1 * work[199] - y1 * work[200];
     increment_jacobian[121] = x3 * work[199] - y3 * work[196];
     increment_jacobian[92] = y3 * work[201] - z3 * work[198];
     increment_jacobian[107] = z3 * work[195] - x3 * work[201];
@@ -846,20 +846,20 @@ spin_chain5_APART static void spin_chain5_linearise_part3(const double coef[33],
     increment_jacobian[90] = y3 * work[203] - z3 * work[200];
     increment_jacobian[105] = z3 * work[197] - x3 * work[203];
     jacobian[8] = work[201] * work[156] + (work[203] * work[157] + work[202] * work[158]);
-    increment_jacobian[8] = y1_ * work[201] - z1 * work[202];
-    increment_jacobian[38] = x1 * work[202] - y1_ * work[203];
+    increment_jacobian[8] = y1 * work[201] - z1 * work[202];
+    increment_jacobian[38] = x1 * work[202] - y1 * work[203];
     increment_jacobian[91] = y3 * work[202] - z3 * work[199];
     increment_jacobian[106] = z3 * work[196] - x3 * work[202];
     increment_jacobian[24] = z1 * work[206] - x1 * work[204];
     jacobian[9] = work[204] * work[156] + (work[206] * work[157] + work[205] * work[158]);
-    increment_jacobian[9] = y1_ * work[204] - z1 * work[205];
-    increment_jacobian[39] = x1 * work[205] - y1_ * work[206];
+    increment_jacobian[9] = y1 * work[204] - z1 * work[205];
+    increment_jacobian[39] = x1 * work[205] - y1 * work[206];
     increment_jacobian[167] = x4 * work[207] - y4 * work[204];
     increment_jacobian[25] = z1 * work[209] - x1 * work[207];
     increment_jacobian[165] = x4 * work[209] - y4 * work[206];
     jacobian[10] = work[207] * work[156] + (work[209] * work[157] + work[208] * work[158]);
-    increment_jacobian[10] = y1_ * work[207] - z1 * work[208];
-    increment_jacobian[40] = x1 * work[208] - y1_ * work[209];
+    increment_jacobian[10] = y1 * work[207] - z1 * work[208];
+    increment_jacobian[40] = x1 * work[208] - y1 * work[209];
     increment_jacobian[166] = x4 * work[208] - y4 * work[205];
     increment_jacobian[137] = y4 * work[210] - z4 * work[207];
     increment_jacobian[152] = z4 * work[204] - x4 * work[210];
@@ -867,8 +867,8 @@ spin_chain5_APART static void spin_chain5_linearise_part3(const double coef[33],
     increment_jacobian[135] = y4 * work[212] - z4 * work[209];
     increment_jacobian[150] = z4 * work[206] - x4 * work[212];
     jacobian[11] = work[210] * work[156] + (work[212] * work[157] + work[211] * work[158]);
-    increment_jacobian[11] = y1_ * work[210] - z1 * work[211];
-    increment_jacobian[41] = x1 * work[211] - y1_ * work[212];
+    increment_jacobian[11] = y1 * work[210] - z1 * work[211];
+    increment_jacobian[41] = x1 * work[211] - y1 * work[212];
     increment_jacobian[136] = y4 * work[211] - z4 * work[208];
     increment_jacobian[151] = z4 * work[205] - x4 * work[211];
 }
@@ -885,7 +885,7 @@ spin_chain5_APART static void spin_chain5_linearise_part4(const double coef[33],
     (void)displacement;
     (void)increment;
     const double x1 = y[0];
-    const double y1_ = y[1];
+    const double y1 = y[1];
     const double z1 = y[2];
     const double x2 = y[3];
     const double y2 = y[4];
@@ -900,7 +900,7 @@ spin_chain5_APART static void spin_chain5_linearise_part4(const double coef[33],
     const double y5 = y[13];
     const double z5 = y[14];
     work[458] = work[149] + (work[150] + (work[151] + work[152]));
-    const double t485 = work[138] + (coef[12] * y1_ + work[52]);
+    const double t485 = work[138] + (coef[12] * y1 + work[52]);
     work[461] = x2 * t485 + (work[154] + work[155]);
     work[464] = y2 * work[159] + (work[160] + work[161]);
     const double t488 = work[144] + (coef[12] * x1 + work[50]);
@@ -934,39 +934,39 @@ spin_chain5_APART static void spin_chain5_linearise_part4(const double coef[33],
     work[288] = work[2] * t510;
     work[318] = 0.5 * y2;
     work[272] = (work[3] - work[226]) * work[223] + 2.0 * (work[224] * work[288]) - work[318];
-    const double t519 = y1_ * (work[227] + coef[19] * y3);
+    const double t519 = y1 * (work[227] + coef[19] * y3);
     const double t520 = z1 * (work[228] + coef[19] * z3);
     const double t521 = y3 * (coef[18] * y3);
     const double t522 = coef[17] + z3 * (coef[18] * z3);
     work[293] = t519 + (t520 + (t521 + t522));
     const double t524 = coef[16] * x3 + coef[6] * x1;
     work[295] = z1 * work[229] + z3 * t524;
-    work[294] = y1_ * work[229] + y3 * t524;
+    work[294] = y1 * work[229] + y3 * t524;
     work[292] = work[0] * work[4] * work[223];
     work[291] = 0.5 * work[2];
     const double t529 = x1 * (work[232] + coef[19] * x3);
     const double t530 = x3 * (coef[18] * x3);
     work[296] = t529 + (t520 + (t530 + t522));
-    work[297] = z1 * work[233] + z3 * (coef[6] * y1_ + coef[16] * y3);
+    work[297] = z1 * work[233] + z3 * (coef[6] * y1 + coef[16] * y3);
     work[324] = 0.5 * work[4];
     work[323] = work[0] * work[2] * work[223];
     work[317] = t529 + (t519 + (t530 + (coef[17] + t521)));
-    const double t536 = y1_ * work[131];
+    const double t536 = y1 * work[131];
     const double t537 = z1 * work[126];
     const double t538 = y3 * work[234];
     const double t539 = coef[0] + z3 * work[235];
     work[299] = t536 + (t537 + (t538 + t539));
     work[300] = x1 * work[236] + (work[237] + work[238]);
     work[301] = x1 * work[239] + (work[240] + work[241]);
-    work[302] = y1_ * work[242] + (work[243] + work[244]);
+    work[302] = y1 * work[242] + (work[243] + work[244]);
     const double t544 = x1 * work[132];
     const double t545 = x3 * work[245];
     work[303] = t544 + (t537 + (t545 + t539));
-    work[304] = y1_ * work[239] + (work[246] + work[247]);
+    work[304] = y1 * work[239] + (work[246] + work[247]);
     work[305] = z1 * work[242] + (work[248] + work[249]);
     work[306] = z1 * work[236] + (work[250] + work[251]);
     work[307] = t544 + (t536 + (t545 + (coef[0] + t538)));
-    const double t551 = y1_ * work[252];
+    const double t551 = y1 * work[252];
     const double t552 = z1 * work[253];
     const double t553 = z3 * (work[7] + work[254]);
     const double t554 = y3 * (work[255] + work[27]);
@@ -976,15 +976,15 @@ spin_chain5_APART static void spin_chain5_linearise_part4(const double coef[33],
     work[347] = coef[15] * z3 + work[136];
     work[310] = x1 * work[257] + x3 * work[347];
     work[356] = work[143] + coef[15] * x3;
-    work[311] = y1_ * work[258] + y3 * work[356];
+    work[311] = y1 * work[258] + y3 * work[356];
     const double t562 = x1 * work[259];
     const double t563 = x3 * (work[260] + work[20]);
     work[312] = t562 + (t552 + (t563 + t553));
-    work[313] = y1_ * work[257] + y3 * work[347];
+    work[313] = y1 * work[257] + y3 * work[347];
     work[314] = z3 * work[356] + z1 * work[258];
     work[316] = t562 + (t551 + (t563 + t554));
     work[315] = z3 * work[346] + z1 * work[256];
-    work[281] = y1_ * (work[138] + (work[52] + work[261]));
+    work[281] = y1 * (work[138] + (work[52] + work[261]));
     work[280] = y3 * work[129];
     work[277] = z3 * work[128];
     work[278] = z1 * (work[135] + (work[262] + work[61]));
@@ -995,14 +995,14 @@ spin_chain5_APART static void spin_chain5_linearise_part4(const double coef[33],
     work[271] = x3 * work[275] + x1 * work[266];
     increment_jacobian[27] = z1 * work[458] - x1 * work[153];
     jacobian[12] = work[153] * work[156] + (work[458] * work[157] + work[461] * work[158]);
-    increment_jacobian[12] = y1_ * work[153] - z1 * work[461];
-    increment_jacobian[42] = x1 * work[461] - y1_ * work[458];
+    increment_jacobian[12] = y1 * work[153] - z1 * work[461];
+    increment_jacobian[42] = x1 * work[461] - y1 * work[458];
     increment_jacobian[212] = x5 * work[464] - y5 * work[153];
     increment_jacobian[28] = z1 * work[459] - x1 * work[464];
     increment_jacobian[210] = x5 * work[459] - y5 * work[458];
     jacobian[13] = work[464] * work[156] + (work[459] * work[157] + work[462] * work[158]);
-    increment_jacobian[13] = y1_ * work[464] - z1 * work[462];
-    increment_jacobian[43] = x1 * work[462] - y1_ * work[459];
+    increment_jacobian[13] = y1 * work[464] - z1 * work[462];
+    increment_jacobian[43] = x1 * work[462] - y1 * work[459];
     increment_jacobian[211] = x5 * work[462] - y5 * work[461];
     increment_jacobian[182] = y5 * work[463] - z5 * work[464];
     increment_jacobian[197] = z5 * work[153] - x5 * work[463];
@@ -1010,8 +1010,8 @@ spin_chain5_APART static void spin_chain5_linearise_part4(const double coef[33],
     increment_jacobian[180] = y5 * work[457] - z5 * work[459];
     increment_jacobian[195] = z5 * work[458] - x5 * work[457];
     jacobian[14] = work[463] * work[156] + (work[457] * work[157] + work[460] * work[158]);
-    increment_jacobian[14] = y1_ * work[463] - z1 * work[460];
-    increment_jacobian[44] = x1 * work[460] - y1_ * work[457];
+    increment_jacobian[14] = y1 * work[463] - z1 * work[460];
+    increment_jacobian[44] = x1 * work[460] - y1 * work[457];
     increment_jacobian[181] = y5 * work[460] - z5 * work[462];
     increment_jacobian[196] = z5 * work[461] - x5 * work[460];
     jacobian[15] = work[178] + work[179] + (work[180] * t499 + (work[181] * t501 + work[182] * t502));
@@ -1113,7 +1113,7 @@ spin_chain5_APART static void spin_chain5_linearise_part5(const double coef[33],
     (void)displacement;
     (void)increment;
     const double x1 = y[0];
-    const double y1_ = y[1];
+    const double y1 = y[1];
     const double z1 = y[2];
     const double x2 = y[3];
     const double y2 = y[4];
@@ -1128,8 +1128,8 @@ spin_chain5_APART static void spin_chain5_linearise_part5(const double coef[33],
     const double y5 = y[13];
     const double z5 = y[14];
     const double t578 = work[50] + work[273];
-    work[466] = y3 * t578 + y1_ * work[274];
-    work[470] = y1_ * work[266] + y3 * work[275];
+    work[466] = y3 * t578 + y1 * work[274];
+    work[470] = y1 * work[266] + y3 * work[275];
     const double t581 = x1 * (work[144] + (work[50] + work[276]));
     const double t582 = x3 * work[134];
     work[468] = t581 + (t582 + work[277] + work[278]);
@@ -1341,7 +1341,7 @@ spin_chain5_APART static void spin_chain5_linearise_part6(const double coef[33],
     (void)displacement;
     (void)increment;
     const double x1 = y[0];
-    const double y1_ = y[1];
+    const double y1 = y[1];
     const double z1 = y[2];
     const double x3 = y[6];
     const double y3 = y[7];
@@ -1387,7 +1387,7 @@ spin_chain5_APART static void spin_chain5_linearise_part6(const double coef[33],
     const double t699 = t694 + (t683 + (t695 + (coef[28] + t685)));
     const double t700 = y3 * work[364];
     const double t701 = z3 * work[361];
-    const double t702 = coef[1] * y1_ + coef[27] * y4;
+    const double t702 = coef[1] * y1 + coef[27] * y4;
     const double t703 = y5 * t702;
     const double t704 = coef[0] + z5 * (coef[1] * z1 + coef[27] * z4);
     work[499] = t700 + (t701 + (t703 + t704));
@@ -1397,7 +1397,7 @@ spin_chain5_APART static void spin_chain5_linearise_part6(const double coef[33],
     work[505] = x3 * t706 + (x5 * t708 + work[431]);
     const double t710 = work[432] + (coef[30] * y4 + work[348]);
     const double t711 = coef[29] * y4;
-    const double t712 = t711 + coef[2] * y1_;
+    const double t712 = t711 + coef[2] * y1;
     work[502] = x3 * t710 + (x5 * t712 + work[433]);
     const double t714 = work[434] + (work[353] + coef[30] * x4);
     work[475] = coef[29] * x4;
@@ -1433,12 +1433,12 @@ spin_chain5_APART static void spin_chain5_linearise_part6(const double coef[33],
     work[493] = work[453] * t736;
     work[484] = work[496] + (2.0 * (work[452] * work[493]) - (work[455] + work[456]) * work[451]);
     work[487] = z1 * work[471] + z4 * t719;
-    work[485] = y1_ * work[78];
+    work[485] = y1 * work[78];
     work[476] = z1 * work[472];
     work[486] = y4 * t711;
     work[477] = coef[31] + z4 * t707;
     work[506] = work[485] + (work[476] + (work[486] + work[477]));
-    work[482] = y4 * t719 + y1_ * work[471];
+    work[482] = y4 * t719 + y1 * work[471];
     work[478] = work[454] * work[453] * work[451];
     work[479] = 0.5 * work[97];
     work[480] = z1 * work[474] + z4 * t702;
@@ -1566,7 +1566,7 @@ spin_chain5_APART static void spin_chain5_linearise_part7(const double coef[33],
     (void)displacement;
     (void)increment;
     const double x1 = y[0];
-    const double y1_ = y[1];
+    const double y1 = y[1];
     const double z1 = y[2];
     const double x2 = y[3];
     const double y2 = y[4];
@@ -1596,7 +1596,7 @@ spin_chain5_APART static void spin_chain5_linearise_part7(const double coef[33],
     const double t770 = (t765 + work[508]) * work[451] + 2.0 * (work[509] * work[489]);
     const double t771 = work[510] + (2.0 * (work[509] * work[495]) - (work[511] + work[449]) * work[451]);
     const double t772 = (work[491] - work[512]) * work[451] + 2.0 * (work[509] * work[493]) - t763;
-    const double t773 = y1_ * work[180];
+    const double t773 = y1 * work[180];
     const double t774 = z1 * work[181];
     const double t775 = x1 * work[183];
     const double t776 = y2 * work[295];
@@ -2038,7 +2038,7 @@ spin_chain5_APART static void spin_chain5_guide_part1(const spin_chain5_params *
                                                       double work[restrict 114])
 {
     const double x1 = x[0];
-    const double y1_ = x[1];
+    const double y1 = x[1];
     const double z1 = x[2];
     const double x2 = x[3];
     const double y2 = x[4];
@@ -2067,7 +2067,7 @@ spin_chain5_APART static void spin_chain5_guide_part1(const spin_chain5_params *
     work[5] = work[30] + work[49];
     const double t14 = x2 * work[5] + x5 * work[5];
     const double t15 = y2 * work[5] + y5 * work[5];
-    work[90] = 1.0 / 6.0 * y1_;
+    work[90] = 1.0 / 6.0 * y1;
     work[29] = 1.0 / 6.0 * y3;
     const double t18 = work[90] + work[29];
     work[99] = (-1.0 / 6.0) * z1;
@@ -2106,7 +2106,7 @@ spin_chain5_APART static void spin_chain5_guide_part1(const spin_chain5_params *
     work[89] = 1.0 / 12.0 * y4;
     work[41] = 1.0 / 6.0 * y2;
     work[43] = work[50] + (work[89] + work[41]);
-    work[102] = y1_ * t40;
+    work[102] = y1 * t40;
     const double t56 = work[41] + work[68];
     work[71] = y5 * z4;
     const double t58 = 1.0 / 12.0 * work[71];
@@ -2125,7 +2125,7 @@ spin_chain5_APART static void spin_chain5_guide_part1(const spin_chain5_params *
     work[104] = y4 * t66;
     const double t72 = y5 * t69;
     const double t73 = y2 * (z3 * work[43] + (work[102] + (z1 * t56 + t62))) + (x5 * (work[10] + (work[109] + (work[110] + x5 * t69))) + y5 * (work[102] + (work[103] + (work[104] + t72))));
-    const double t74 = gauge[0] * (z1 * (t4 + (work[75] + t10)) + (x1 * t14 + y1_ * t15)) + (work[46] + work[74]) + params->J * (x2 * (z3 * work[47] + (work[10] + (z1 * t42 + work[12]))) + t73);
+    const double t74 = gauge[0] * (z1 * (t4 + (work[75] + t10)) + (x1 * t14 + y1 * t15)) + (work[46] + work[74]) + params->J * (x2 * (z3 * work[47] + (work[10] + (z1 * t42 + work[12]))) + t73);
     const double t75 = work[25] * t74;
     work[28] = 1.0 / 6.0 * y5;
     work[4] = work[28] + work[41];
@@ -2134,7 +2134,7 @@ spin_chain5_APART static void spin_chain5_guide_part1(const spin_chain5_params *
     const double t80 = z2 * (work[48] - work[76]);
     const double t81 = 1.0 / 6.0 * (z5 * z5);
     work[81] = t5 - t81;
-    work[85] = (-1.0 / 6.0) * y1_;
+    work[85] = (-1.0 / 6.0) * y1;
     const double t84 = work[85] - work[29];
     const double t85 = work[40] + work[101];
     work[57] = gauge[1] * (x2 * (x2 * t84 + y2 * t24) + z2 * (z2 * t84 + y2 * t85));
@@ -2163,8 +2163,8 @@ spin_chain5_APART static void spin_chain5_guide_part1(const spin_chain5_params *
     work[93] = z4 * t108;
     work[112] = x3 * t106;
     work[113] = x4 * t108;
-    const double t112 = z2 * (y3 * work[53] + (y1_ * t101 + t104)) + (z5 * (work[91] + (work[92] + (t28 + work[93]))) + x5 * (work[22] + (work[112] + (x5 * t27 + work[113]))));
-    const double t113 = gauge[0] * (z1 * t15 + x1 * t78 + y1_ * (t4 + (t80 + work[81]))) + (work[57] + work[80]) + params->J * (x2 * (y3 * work[47] + (work[22] + (y1_ * t42 + work[24]))) + t112);
+    const double t112 = z2 * (y3 * work[53] + (y1 * t101 + t104)) + (z5 * (work[91] + (work[92] + (t28 + work[93]))) + x5 * (work[22] + (work[112] + (x5 * t27 + work[113]))));
+    const double t113 = gauge[0] * (z1 * t15 + x1 * t78 + y1 * (t4 + (t80 + work[81]))) + (work[57] + work[80]) + params->J * (x2 * (y3 * work[47] + (work[22] + (y1 * t42 + work[24]))) + t112);
     const double t114 = work[25] * t113;
     const double t115 = (-1.0 / 6.0) * (y2 * y2) - 1.0 / 6.0 * (z2 * z2);
     const double t116 = y2 * t18;
@@ -2178,7 +2178,7 @@ spin_chain5_APART static void spin_chain5_guide_part1(const spin_chain5_params *
     work[82] = gauge[4] * (x5 * work[111] + (x4 * work[83] + x1 * work[83]));
     work[32] = 1.0 / 6.0 * x5;
     work[3] = work[33] - work[32];
-    work[106] = y1_ * work[3];
+    work[106] = y1 * work[3];
     const double t128 = work[33] - work[7];
     work[14] = t95 - t93;
     const double t130 = work[106] + (y3 * t128 + work[14]);
@@ -2193,7 +2193,7 @@ spin_chain5_APART static void spin_chain5_guide_part1(const spin_chain5_params *
     work[107] = y3 * t135;
     work[108] = y4 * t137;
     const double t141 = z2 * (x3 * work[53] + (x1 * t101 + t133)) + (z5 * (work[95] + (work[96] + (t33 + work[97]))) + y5 * (work[106] + (work[107] + (work[108] + t87))));
-    const double t142 = work[64] + work[82] + gauge[0] * (z1 * t14 + y1_ * t78 + x1 * (t10 + (t80 + work[83]))) + params->J * (y2 * (x3 * work[43] + (x1 * t56 + t130)) + t141);
+    const double t142 = work[64] + work[82] + gauge[0] * (z1 * t14 + y1 * t78 + x1 * (t10 + (t80 + work[83]))) + params->J * (y2 * (x3 * work[43] + (x1 * t56 + t130)) + t141);
     const double t143 = work[25] * t142;
     work[0] = work[41] + work[52];
     const double t145 = z3 * work[0];
@@ -2206,14 +2206,14 @@ spin_chain5_APART static void spin_chain5_guide_part1(const spin_chain5_params *
     const double t152 = work[32] + work[36];
     work[11] = z1 * t152;
     const double t154 = z1 * work[4];
-    work[94] = gauge[0] * (x1 * (work[11] + work[10]) + y1_ * (work[102] + t154));
+    work[94] = gauge[0] * (x1 * (work[11] + work[10]) + y1 * (work[102] + t154));
     const double t156 = x2 * t24;
     const double t157 = t116 + t156;
     work[84] = (-1.0 / 6.0) * x1;
     const double t159 = x1 * (work[84] - 1.0 / 3.0 * x3);
     const double t160 = (-1.0 / 6.0) * (x3 * x3);
     const double t161 = y3 * y3;
-    work[20] = y1_ * (work[85] - 1.0 / 3.0 * y3);
+    work[20] = y1 * (work[85] - 1.0 / 3.0 * y3);
     const double t163 = work[37] + (work[100] + 1.0 / 3.0 * z2);
     work[8] = work[34] - work[50];
     work[54] = z1 * work[8];
@@ -2227,10 +2227,10 @@ spin_chain5_APART static void spin_chain5_guide_part1(const spin_chain5_params *
     const double t173 = work[33] - work[59];
     work[63] = z3 * t173;
     work[61] = t49 + work[63];
-    const double t176 = y1_ * work[5];
-    const double t177 = x1 * (x3 * t163 + (x1 * work[5] + t133)) + (y3 * (work[54] + (t167 + work[55])) + x3 * (work[60] + (x3 * work[1] + work[61])) + y1_ * (y3 * t163 + (t176 + t104)));
+    const double t176 = y1 * work[5];
+    const double t177 = x1 * (x3 * t163 + (x1 * work[5] + t133)) + (y3 * (work[54] + (t167 + work[55])) + x3 * (work[60] + (x3 * work[1] + work[61])) + y1 * (y3 * t163 + (t176 + t104)));
     work[26] = work[25] * (work[73] + work[94] + gauge[1] * (z1 * t157 + z3 * t157 + z2 * (t159 + (t160 - 1.0 / 6.0 * t161 + work[20]))) + params->J * t177);
-    work[23] = y1_ * t152;
+    work[23] = y1 * t152;
     work[105] = gauge[0] * (x1 * (work[23] + work[22]) + z1 * (work[91] + t176));
     work[15] = y3 * work[35];
     work[13] = x3 * t168;
@@ -2239,18 +2239,18 @@ spin_chain5_APART static void spin_chain5_guide_part1(const spin_chain5_params *
     const double t185 = 1.0 / 6.0 * (z3 * z3);
     const double t186 = t117 + t156;
     const double t187 = work[50] + (work[89] + 1.0 / 3.0 * y2);
-    work[65] = y1_ * t171;
+    work[65] = y1 * t171;
     work[62] = y3 * t173;
     work[66] = t96 + work[62];
     work[9] = work[48] - work[37];
-    work[44] = y1_ * work[9];
+    work[44] = y1 * work[9];
     const double t193 = x3 * (work[65] + (x3 * work[0] + work[66])) + z3 * (work[44] + (work[42] + (t145 + work[45]))) + z1 * (z3 * t187 + (work[102] + (t154 + t62)));
-    const double t194 = work[105] + work[79] + gauge[1] * (y2 * (t159 + (work[21] + (t160 - t185))) + (y1_ * t186 + y3 * t186)) + params->J * (x1 * (x3 * t187 + (x1 * work[4] + t130)) + t193);
+    const double t194 = work[105] + work[79] + gauge[1] * (y2 * (t159 + (work[21] + (t160 - t185))) + (y1 * t186 + y3 * t186)) + params->J * (x1 * (x3 * t187 + (x1 * work[4] + t130)) + t193);
     work[27] = work[25] * t194;
     work[2] = (-1.0 / 6.0) * t161 - t185;
-    error[0] = y1_ * t75 - z1 * t114;
+    error[0] = y1 * t75 - z1 * t114;
     error[1] = z1 * t143 - x1 * t75;
-    error[2] = x1 * t114 - y1_ * t143;
+    error[2] = x1 * t114 - y1 * t143;
     error[3] = y2 * work[26] - z2 * work[27];
 }
 
@@ -2260,7 +2260,7 @@ spin_chain5_APART static void spin_chain5_guide_part2(const spin_chain5_params *
                                                       double work[restrict 114])
 {
     const double x1 = x[0];
-    const double y1_ = x[1];
+    const double y1 = x[1];
     const double z1 = x[2];
     const double x2 = x[3];
     const double y2 = x[4];
@@ -2278,12 +2278,12 @@ spin_chain5_APART static void spin_chain5_guide_part2(const spin_chain5_params *
     const double t198 = z3 * work[1];
     const double t199 = t197 + t198;
     const double t200 = gauge[2] * (x4 * work[2] + x2 * work[2] + x3 * t199);
-    const double t201 = gauge[0] * (y1_ * y1_ * work[3] + z1 * z1 * work[3] + x1 * (y1_ * work[4] + z1 * work[5]));
+    const double t201 = gauge[0] * (y1 * y1 * work[3] + z1 * z1 * work[3] + x1 * (y1 * work[4] + z1 * work[5]));
     const double t202 = work[6] + (1.0 / 3.0 * x2 + work[7]);
     const double t203 = x1 * work[8];
     const double t204 = x1 * work[9];
     const double t205 = z1 * (z3 * t202 + (work[10] + (work[11] + work[12]))) + (y3 * (t203 + (work[13] + (work[14] + work[15]))) + z3 * (t204 + (work[16] + (work[17] + work[18]))));
-    const double t206 = gauge[1] * (x3 * work[19] + x1 * work[19] + x2 * (work[20] + (work[2] + work[21]))) + (t200 + t201) + params->J * (y1_ * (y3 * t202 + (work[22] + (work[23] + work[24]))) + t205);
+    const double t206 = gauge[1] * (x3 * work[19] + x1 * work[19] + x2 * (work[20] + (work[2] + work[21]))) + (t200 + t201) + params->J * (y1 * (y3 * t202 + (work[22] + (work[23] + work[24]))) + t205);
     const double t207 = work[25] * t206;
     const double t208 = work[28] + work[29];
     const double t209 = z4 * t208;
@@ -2303,7 +2303,7 @@ spin_chain5_APART static void spin_chain5_guide_part2(const spin_chain5_params *
     const double t223 = t222 + t197;
     const double t224 = t215 + work[36];
     const double t225 = work[37] - work[38];
-    const double t226 = y1_ * t225;
+    const double t226 = y1 * t225;
     const double t227 = (-1.0 / 12.0) * z1 - work[39];
     const double t228 = y5 * t227;
     const double t229 = work[30] + work[40];
@@ -2326,12 +2326,12 @@ spin_chain5_APART static void spin_chain5_guide_part2(const spin_chain5_params *
     const double t246 = work[49] + t243;
     const double t247 = work[50] - work[51];
     const double t248 = z1 * t247;
-    const double t249 = (-1.0 / 12.0) * y1_ - work[52];
+    const double t249 = (-1.0 / 12.0) * y1 - work[52];
     const double t250 = z5 * t249;
     const double t251 = x1 * t247;
     const double t252 = x5 * t249;
-    const double t253 = z2 * (y1_ * work[53] + (work[54] + (y3 * t246 + work[55]))) + (z4 * (t248 + (work[56] + (t209 + t250))) + x4 * (t251 + (work[13] + (t252 + x4 * t208))));
-    const double t254 = work[57] + t240 + gauge[2] * (y3 * (t216 + (t242 + t244)) + (y2 * t245 + y4 * t245)) + params->J * (x2 * (y1_ * work[47] + (t203 + (work[13] + (work[14] + y3 * t224)))) + t253);
+    const double t253 = z2 * (y1 * work[53] + (work[54] + (y3 * t246 + work[55]))) + (z4 * (t248 + (work[56] + (t209 + t250))) + x4 * (t251 + (work[13] + (t252 + x4 * t208))));
+    const double t254 = work[57] + t240 + gauge[2] * (y3 * (t216 + (t242 + t244)) + (y2 * t245 + y4 * t245)) + params->J * (x2 * (y1 * work[47] + (t203 + (work[13] + (work[14] + y3 * t224)))) + t253);
     const double t255 = work[25] * t254;
     const double t256 = (-1.0 / 6.0) * t218 - t241;
     const double t257 = y4 * t208;
@@ -2339,7 +2339,7 @@ spin_chain5_APART static void spin_chain5_guide_part2(const spin_chain5_params *
     const double t259 = t257 + t258;
     const double t260 = gauge[3] * (x3 * t256 + x5 * t256 + x4 * t259);
     const double t261 = work[6] - work[58];
-    const double t262 = y1_ * t261;
+    const double t262 = y1 * t261;
     const double t263 = (-1.0 / 12.0) * x1 - work[59];
     const double t264 = y5 * t263;
     const double t265 = z1 * t261;
@@ -2362,14 +2362,14 @@ spin_chain5_APART static void spin_chain5_guide_part2(const spin_chain5_params *
     const double t282 = (-1.0 / 12.0) * x2;
     const double t283 = t282 - work[59];
     const double t284 = t280 - t281 + z3 * t283;
-    const double t285 = y1_ * t277;
+    const double t285 = y1 * t277;
     const double t286 = work[51] + work[28];
     const double t287 = 1.0 / 6.0 * work[71];
     const double t288 = 1.0 / 6.0 * work[72];
     const double t289 = (-1.0 / 12.0) * y2;
     const double t290 = t289 - work[52];
     const double t291 = t287 - t288 + z3 * t290;
-    const double t292 = work[50] + (1.0 / 12.0 * y1_ + work[29]);
+    const double t292 = work[50] + (1.0 / 12.0 * y1 + work[29]);
     const double t293 = work[29] + work[68];
     const double t294 = x5 * (t278 + (z1 * t279 + t284)) + y5 * (t285 + (z1 * t286 + t291)) + y3 * (z2 * t292 + (t248 + (work[56] + (z4 * t293 + t250))));
     const double t295 = work[73] + work[74] + gauge[3] * (z4 * (t270 + (work[75] + t271)) + (z3 * t273 + z5 * t273)) + params->J * (x3 * (z2 * t274 + (t265 + (work[63] + (z4 * t275 + t266)))) + t294);
@@ -2388,21 +2388,21 @@ spin_chain5_APART static void spin_chain5_guide_part2(const spin_chain5_params *
     const double t308 = 1.0 / 6.0 * work[77];
     const double t309 = 1.0 / 6.0 * work[78];
     const double t310 = t308 - t309 + y3 * t283;
-    const double t311 = z3 * (y2 * t299 + (t226 + (work[42] + (y4 * t300 + t228)))) + (z5 * (y1_ * t301 + (t303 + (t304 + t306))) + x5 * (t307 + (y1_ * t279 + t310)));
+    const double t311 = z3 * (y2 * t299 + (t226 + (work[42] + (y4 * t300 + t228)))) + (z5 * (y1 * t301 + (t303 + (t304 + t306))) + x5 * (t307 + (y1 * t279 + t310)));
     const double t312 = work[79] + work[80] + gauge[3] * (y3 * t297 + y5 * t297 + y4 * (t270 + (t298 + work[81]))) + params->J * (x3 * (y2 * t274 + (t262 + (work[62] + (t264 + y4 * t275)))) + t311);
     const double t313 = work[25] * t312;
     const double t314 = t282 - work[32];
     const double t315 = z1 * t314;
     const double t316 = x3 * t305;
     const double t317 = t281 - t280;
-    const double t318 = y1_ * t314;
+    const double t318 = y1 * t314;
     const double t319 = x3 * t290;
     const double t320 = t309 - t308;
     const double t321 = z5 * (x1 * t301 + (t315 + (t316 + t317))) + y5 * (x1 * t286 + (t318 + (t319 + t320))) + z3 * (x2 * t299 + (t231 + (work[16] + (x4 * t300 + t232))));
     const double t322 = work[82] + t200 + gauge[3] * (x5 * t259 + x3 * t259 + x4 * (t271 + (work[83] + t298))) + params->J * (y3 * (x2 * t292 + (t251 + (work[13] + (t252 + x4 * t293)))) + t321);
     const double t323 = work[25] * t322;
     const double t324 = x1 * (work[84] - t215);
-    const double t325 = y1_ * (work[85] - t220);
+    const double t325 = y1 * (work[85] - t220);
     const double t326 = x5 * work[86];
     const double t327 = t326 + work[87];
     const double t328 = work[7] + (work[88] + 1.0 / 12.0 * x3);
@@ -2411,7 +2411,7 @@ spin_chain5_APART static void spin_chain5_guide_part2(const spin_chain5_params *
     const double t331 = work[59] + work[58];
     const double t332 = work[89] + (1.0 / 12.0 * y3 + work[90]);
     const double t333 = work[90] + t220;
-    const double t334 = y4 * (t303 + (t306 + (z3 * t330 + t304))) + x4 * (t315 + (t316 + (z3 * t331 + t317))) + y1_ * (z2 * t332 + (work[91] + (work[92] + (work[93] + z5 * t333))));
+    const double t334 = y4 * (t303 + (t306 + (z3 * t330 + t304))) + x4 * (t315 + (t316 + (z3 * t331 + t317))) + y1 * (z2 * t332 + (work[91] + (work[92] + (work[93] + z5 * t333))));
     const double t335 = gauge[4] * (z5 * (t324 + (t325 + t219)) + (z4 * t327 + z1 * t327)) + (work[94] + t214) + params->J * (x1 * (z2 * t328 + (work[95] + (work[96] + (z5 * t329 + work[97])))) + t334);
     const double t336 = work[25] * t335;
     const double t337 = t326 + work[98];
@@ -2420,10 +2420,10 @@ spin_chain5_APART static void spin_chain5_guide_part2(const spin_chain5_params *
     const double t340 = t243 + work[101];
     const double t341 = work[39] + work[38];
     const double t342 = z1 * (y2 * t339 + (work[102] + (work[103] + (work[104] + y5 * t340)))) + (x4 * (t318 + (t319 + (y3 * t331 + t320))) + z4 * (t285 + (y3 * t341 + t291)));
-    const double t343 = gauge[4] * (y4 * t337 + y1_ * t337 + y5 * (t324 + (t242 + t338))) + (work[105] + t240) + params->J * (x1 * (y2 * t328 + (work[106] + (work[107] + (y5 * t329 + work[108])))) + t342);
+    const double t343 = gauge[4] * (y4 * t337 + y1 * t337 + y5 * (t324 + (t242 + t338))) + (work[105] + t240) + params->J * (x1 * (y2 * t328 + (work[106] + (work[107] + (y5 * t329 + work[108])))) + t342);
     const double t344 = work[25] * t343;
     const double t345 = z4 * (t278 + (x3 * t341 + t284)) + y4 * (t307 + (x3 * t330 + t310)) + z1 * (x2 * t339 + (work[10] + (work[109] + (work[110] + x5 * t340))));
-    const double t346 = gauge[4] * (x4 * work[111] + x1 * work[111] + x5 * (t325 + (t256 + t338))) + (t260 + t201) + params->J * (y1_ * (x2 * t332 + (work[22] + (work[112] + (x5 * t333 + work[113])))) + t345);
+    const double t346 = gauge[4] * (x4 * work[111] + x1 * work[111] + x5 * (t325 + (t256 + t338))) + (t260 + t201) + params->J * (y1 * (x2 * t332 + (work[22] + (work[112] + (x5 * t333 + work[113])))) + t345);
     const double t347 = work[25] * t346;
     error[4] = z2 * t207 - x2 * work[26];
     error[5] = x2 * work[27] - y2 * t207;
@@ -2451,7 +2451,7 @@ static void spin_chain5_guide(const spin_chain5_params *params, const double gau
 static void spin_chain5_products(const spin_chain5_params *params, const double x[15], double out[restrict 11])
 {
     const double x1 = x[0];
-    const double y1_ = x[1];
+    const double y1 = x[1];
     const double z1 = x[2];
     const double x2 = x[3];
     const double y2 = x[4];
@@ -2468,7 +2468,7 @@ static void spin_chain5_products(const spin_chain5_params *params, const double 
     const double t1 = params->J * z4;
     const double t2 = params->J * z1;
     const double t3 = t1 + t2;
-    const double t4 = params->J * y1_;
+    const double t4 = params->J * y1;
     const double t5 = params->J * y4;
     const double t6 = t4 + t5;
     const double t7 = params->J * x4;
@@ -2497,8 +2497,8 @@ static void spin_chain5_products(const spin_chain5_params *params, const double 
     const double t30 = t18 + t13;
     const double t31 = t22 * t22 + t24 * t24 + (t25 * t25 + t26 * t26) + (t27 * t27 + t28 * t28 + (t29 * t29 + t30 * t30));
     out[0] = t3 * t3 + (t6 * t6 + t9 * t9) + (t12 * t12 + t14 * t14 + (t17 * t17 + t20 * t20)) + t31;
-    out[1] = (-2.0) * (x1 * t27) - 2.0 * (y1_ * t28) - 2.0 * (z1 * t30);
-    out[2] = 4.0 * (z1 * z1) + (4.0 * (y1_ * y1_) + 4.0 * (x1 * x1));
+    out[1] = (-2.0) * (x1 * t27) - 2.0 * (y1 * t28) - 2.0 * (z1 * t30);
+    out[2] = 4.0 * (z1 * z1) + (4.0 * (y1 * y1) + 4.0 * (x1 * x1));
     out[3] = (-2.0) * (y2 * t26) - 2.0 * (z2 * t25) - 2.0 * (x2 * t29);
     out[4] = 4.0 * (x2 * x2) + (4.0 * (y2 * y2) + 4.0 * (z2 * z2));
     out[5] = (-2.0) * (x3 * t24) - 2.0 * (y3 * t22) - 2.0 * (z3 * t14);
@@ -2761,7 +2761,7 @@ spin_chain5_APART static void spin_chain5_linearise_lanes_part1(spin_chain5_lane
     spin_chain5_EACH_LANE
     for (int lane = 0; lane < spin_chain5_LANES; ++lane) {
         const double x1 = y[0][lane];
-        const double y1_ = y[1][lane];
+        const double y1 = y[1][lane];
         const double z1 = y[2][lane];
         const double x2 = y[3][lane];
         const double y2 = y[4][lane];
@@ -2793,7 +2793,7 @@ spin_chain5_APART static void spin_chain5_linearise_lanes_part1(spin_chain5_lane
         work[27][lane] = coef[3][lane] * y5;
         work[52][lane] = coef[3][lane] * y4;
         work[9][lane] = work[27][lane] + (coef[5][lane] * y2 + work[52][lane]);
-        const double t19 = y1_ * t4;
+        const double t19 = y1 * t4;
         const double t20 = coef[13][lane] * y2;
         work[106][lane] = t20 + coef[12][lane] * y5;
         work[38][lane] = y5 * z4;
@@ -2817,7 +2817,7 @@ spin_chain5_APART static void spin_chain5_linearise_lanes_part1(spin_chain5_lane
         work[148][lane] = work[65][lane] + (work[66][lane] + (work[67][lane] + work[147][lane]));
         work[40][lane] = coef[0][lane] * z5;
         work[13][lane] = coef[0][lane] * z2;
-        work[80][lane] = y1_ * t27;
+        work[80][lane] = y1 * t27;
         work[81][lane] = y3 * work[127][lane];
         work[160][lane] = y5 * t38;
         work[82][lane] = y4 * work[137][lane];
@@ -2833,14 +2833,14 @@ spin_chain5_APART static void spin_chain5_linearise_lanes_part1(spin_chain5_lane
         const double t55 = coef[6][lane] * y2;
         work[131][lane] = work[129][lane] + t55;
         const double t57 = t53 + x3 * work[131][lane];
-        work[120][lane] = y3 * work[14][lane] + (t50 + (y1_ * work[116][lane] + t57));
+        work[120][lane] = y3 * work[14][lane] + (t50 + (y1 * work[116][lane] + t57));
         work[7][lane] = coef[3][lane] * z5;
         work[23][lane] = work[7][lane] + (coef[5][lane] * z2 + work[61][lane]);
         const double t61 = coef[13][lane] * z2;
         work[107][lane] = coef[12][lane] * z5 + t61;
         work[12][lane] = coef[4][lane] * work[38][lane] + coef[3][lane] * work[39][lane];
         const double t64 = z1 * work[115][lane] + (work[12][lane] + z3 * work[131][lane]);
-        work[125][lane] = y3 * work[23][lane] + (y1_ * work[107][lane] + t64);
+        work[125][lane] = y3 * work[23][lane] + (y1 * work[107][lane] + t64);
         work[114][lane] = coef[7][lane] * y5 + coef[8][lane] * y2;
         work[76][lane] = x1 * work[114][lane];
         work[28][lane] = coef[4][lane] * y2;
@@ -2850,7 +2850,7 @@ spin_chain5_APART static void spin_chain5_linearise_lanes_part1(spin_chain5_lane
         work[47][lane] = coef[1][lane] * y5;
         work[142][lane] = work[118][lane] + work[47][lane];
         work[79][lane] = x4 * work[142][lane];
-        work[53][lane] = coef[11][lane] * y1_;
+        work[53][lane] = coef[11][lane] * y1;
         const double t76 = work[53][lane] + coef[2][lane] * y4;
         work[154][lane] = x5 * t76;
         work[155][lane] = work[76][lane] + (work[77][lane] + (work[79][lane] + work[154][lane]));
@@ -2861,20 +2861,20 @@ spin_chain5_APART static void spin_chain5_linearise_lanes_part1(spin_chain5_lane
         work[60][lane] = z4 * work[142][lane];
         work[167][lane] = z5 * t76;
         work[168][lane] = work[58][lane] + (work[59][lane] + (work[60][lane] + work[167][lane]));
-        work[108][lane] = x2 * work[120][lane] + (z2 * work[125][lane] + (x5 * work[155][lane] + (work[48][lane] + (work[34][lane] + coef[10][lane] * y1_) + z5 * work[168][lane])));
+        work[108][lane] = x2 * work[120][lane] + (z2 * work[125][lane] + (x5 * work[155][lane] + (work[48][lane] + (work[34][lane] + coef[10][lane] * y1) + z5 * work[168][lane])));
         work[112][lane] = work[108][lane] * work[108][lane];
         work[99][lane] = coef[9][lane] * x2 + coef[8][lane] * x5;
         work[134][lane] = coef[4][lane] * x4;
         const double t89 = coef[6][lane] * x2;
         work[132][lane] = work[134][lane] + t89;
         work[31][lane] = coef[4][lane] * work[43][lane] + coef[3][lane] * work[44][lane];
-        const double t92 = y1_ * work[99][lane] + (y3 * work[132][lane] + work[31][lane]);
+        const double t92 = y1 * work[99][lane] + (y3 * work[132][lane] + work[31][lane]);
         work[122][lane] = x3 * work[9][lane] + (x1 * work[106][lane] + t92);
         work[17][lane] = coef[3][lane] * work[36][lane] + coef[4][lane] * work[37][lane];
         const double t95 = z1 * work[99][lane] + (work[17][lane] + z3 * work[132][lane]);
         work[124][lane] = x3 * work[23][lane] + (x1 * work[107][lane] + t95);
         work[98][lane] = coef[8][lane] * x2 + coef[7][lane] * x5;
-        work[92][lane] = y1_ * work[98][lane];
+        work[92][lane] = y1 * work[98][lane];
         work[19][lane] = coef[4][lane] * x2;
         work[133][lane] = work[19][lane] + work[50][lane];
         work[93][lane] = y3 * work[133][lane];
@@ -2902,10 +2902,10 @@ spin_chain5_APART static void spin_chain5_linearise_lanes_part1(spin_chain5_lane
         work[103][lane] = x1 * work[101][lane];
         work[102][lane] = work[217][lane] - work[103][lane];
         work[110][lane] = x1 * work[108][lane];
-        work[175][lane] = y1_ * work[109][lane];
+        work[175][lane] = y1 * work[109][lane];
         work[111][lane] = work[110][lane] - work[175][lane];
         work[105][lane] = work[101][lane] * work[102][lane] - work[108][lane] * work[111][lane];
-        work[171][lane] = y1_ * work[101][lane];
+        work[171][lane] = y1 * work[101][lane];
         work[218][lane] = z1 * work[108][lane];
         work[172][lane] = work[171][lane] - work[218][lane];
         work[169][lane] = work[109][lane] * work[111][lane] - work[101][lane] * work[172][lane];
@@ -2930,7 +2930,7 @@ spin_chain5_APART static void spin_chain5_linearise_lanes_part1(spin_chain5_lane
         work[234][lane] = coef[15][lane] * y4 + coef[16][lane] * y2;
         work[33][lane] = z3 * work[234][lane] + t24;
         work[247][lane] = work[32][lane] + (work[246][lane] + work[33][lane]);
-        work[2][lane] = x1 * (x3 * work[239][lane] + (x1 * t134 + t95)) + (y1_ * (y3 * work[239][lane] + (y1_ * t134 + t64)) + (x3 * work[241][lane] + (work[41][lane] + (coef[17][lane] * z2 + work[54][lane]) + y3 * work[247][lane])));
+        work[2][lane] = x1 * (x3 * work[239][lane] + (x1 * t134 + t95)) + (y1 * (y3 * work[239][lane] + (y1 * t134 + t64)) + (x3 * work[241][lane] + (work[41][lane] + (coef[17][lane] * z2 + work[54][lane]) + y3 * work[247][lane])));
         work[242][lane] = work[20][lane] + (coef[19][lane] * x2 + work[50][lane]);
         const double t154 = coef[20][lane] * x5 + t6;
         work[29][lane] = x1 * t147;
@@ -2948,21 +2948,21 @@ spin_chain5_APART static void spin_chain5_linearise_lanes_part1(spin_chain5_lane
         work[16][lane] = x3 * work[235][lane];
         work[248][lane] = z3 * t158;
         work[249][lane] = work[15][lane] + (work[16][lane] + (work[17][lane] + work[248][lane]));
-        work[0][lane] = y1_ * (y3 * work[242][lane] + (t50 + (y1_ * t154 + t57))) + (z1 * (z3 * work[242][lane] + (t5 + (z1 * t154 + t14))) + (y3 * work[244][lane] + (work[46][lane] + (work[72][lane] + coef[17][lane] * x2) + z3 * work[249][lane])));
+        work[0][lane] = y1 * (y3 * work[242][lane] + (t50 + (y1 * t154 + t57))) + (z1 * (z3 * work[242][lane] + (t5 + (z1 * t154 + t14))) + (y3 * work[244][lane] + (work[46][lane] + (work[72][lane] + coef[17][lane] * x2) + z3 * work[249][lane])));
         work[320][lane] = z2 * work[0][lane];
         work[226][lane] = x2 * work[2][lane];
         work[3][lane] = work[320][lane] - work[226][lane];
         work[236][lane] = work[27][lane] + (coef[19][lane] * y2 + work[52][lane]);
         const double t174 = coef[20][lane] * y5 + t20;
-        work[21][lane] = y1_ * t136;
+        work[21][lane] = y1 * t136;
         work[6][lane] = coef[18][lane] * y2;
         const double t177 = work[6][lane] + coef[14][lane] * y4;
         work[237][lane] = x3 * t177;
         work[22][lane] = y3 * work[245][lane] + t53;
         work[238][lane] = work[21][lane] + (work[237][lane] + work[22][lane]);
         work[49][lane] = coef[0][lane] * y3;
-        work[87][lane] = coef[0][lane] * y1_;
-        work[10][lane] = y1_ * t164;
+        work[87][lane] = coef[0][lane] * y1;
+        work[10][lane] = y1 * t164;
         work[11][lane] = y3 * work[235][lane];
         work[250][lane] = z3 * t177;
         work[251][lane] = work[10][lane] + (work[11][lane] + (work[250][lane] + work[12][lane]));
@@ -2992,7 +2992,7 @@ spin_chain5_APART static void spin_chain5_linearise_lanes_part2(spin_chain5_lane
     spin_chain5_EACH_LANE
     for (int lane = 0; lane < spin_chain5_LANES; ++lane) {
         const double x1 = y[0][lane];
-        const double y1_ = y[1][lane];
+        const double y1 = y[1][lane];
         const double z1 = y[2][lane];
         const double x2 = y[3][lane];
         const double y2 = y[4][lane];
@@ -3035,7 +3035,7 @@ spin_chain5_APART static void spin_chain5_linearise_lanes_part2(spin_chain5_lane
         const double t214 = x5 * work[361][lane];
         work[345][lane] = t205 + (t207 + (work[344][lane] + t214));
         const double t216 = coef[0][lane] * z4;
-        const double t217 = y1_ * t204;
+        const double t217 = y1 * t204;
         const double t218 = y3 * t206;
         const double t219 = y5 * work[361][lane];
         work[351][lane] = y4 * t209;
@@ -3044,7 +3044,7 @@ spin_chain5_APART static void spin_chain5_linearise_lanes_part2(spin_chain5_lane
         work[327][lane] = x2 * (z1 * work[14][lane] + (work[15][lane] + (work[16][lane] + (work[17][lane] + z3 * work[342][lane])))) + t222;
         work[338][lane] = work[18][lane] + coef[26][lane] * z4;
         const double t224 = work[19][lane] + work[20][lane];
-        const double t225 = y1_ * t224;
+        const double t225 = y1 * t224;
         work[336][lane] = coef[23][lane] * x4 + coef[15][lane] * x2;
         const double t227 = y3 * work[336][lane];
         const double t228 = coef[25][lane] * x3;
@@ -3070,7 +3070,7 @@ spin_chain5_APART static void spin_chain5_linearise_lanes_part2(spin_chain5_lane
         work[341][lane] = coef[15][lane] * y2 + coef[23][lane] * y4;
         const double t248 = x3 * work[341][lane];
         const double t249 = coef[22][lane] * y4;
-        work[263][lane] = coef[4][lane] * y1_;
+        work[263][lane] = coef[4][lane] * y1;
         work[364][lane] = t249 + work[263][lane];
         const double t252 = x5 * work[364][lane];
         const double t253 = coef[25][lane] * y3;
@@ -3083,7 +3083,7 @@ spin_chain5_APART static void spin_chain5_linearise_lanes_part2(spin_chain5_lane
         work[359][lane] = z4 * t254;
         const double t261 = z5 * work[364][lane];
         work[360][lane] = t258 + (t259 + (work[359][lane] + t261));
-        work[332][lane] = x2 * (y1_ * work[14][lane] + (work[29][lane] + (work[30][lane] + (work[31][lane] + y3 * work[342][lane])))) + (z2 * (y1_ * work[23][lane] + (work[32][lane] + (y3 * work[338][lane] + work[33][lane]))) + (x4 * work[350][lane] + (work[88][lane] + (coef[24][lane] * y3 + work[34][lane]) + z4 * work[360][lane])));
+        work[332][lane] = x2 * (y1 * work[14][lane] + (work[29][lane] + (work[30][lane] + (work[31][lane] + y3 * work[342][lane])))) + (z2 * (y1 * work[23][lane] + (work[32][lane] + (y3 * work[338][lane] + work[33][lane]))) + (x4 * work[350][lane] + (work[88][lane] + (coef[24][lane] * y3 + work[34][lane]) + z4 * work[360][lane])));
         work[334][lane] = x3 * work[332][lane];
         work[370][lane] = y3 * work[333][lane];
         work[335][lane] = work[334][lane] - work[370][lane];
@@ -3104,7 +3104,7 @@ spin_chain5_APART static void spin_chain5_linearise_lanes_part2(spin_chain5_lane
         const double t280 = work[20][lane] + (work[260][lane] + work[353][lane]);
         work[430][lane] = coef[30][lane] * x5 + t228;
         work[255][lane] = coef[14][lane] * y3;
-        work[348][lane] = coef[3][lane] * y1_;
+        work[348][lane] = coef[3][lane] * y1;
         const double t284 = work[27][lane] + (work[255][lane] + work[348][lane]);
         work[424][lane] = coef[30][lane] * y5 + t253;
         const double t286 = work[35][lane] + work[8][lane];
@@ -3115,7 +3115,7 @@ spin_chain5_APART static void spin_chain5_linearise_lanes_part2(spin_chain5_lane
         const double t291 = work[19][lane] + t231;
         work[74][lane] = coef[27][lane] * work[36][lane] + coef[29][lane] * work[37][lane] + z3 * t291;
         work[431][lane] = work[73][lane] + (z1 * t290 + work[74][lane]);
-        work[89][lane] = y1_ * t286;
+        work[89][lane] = y1 * t286;
         work[139][lane] = coef[2][lane] * y5;
         work[432][lane] = coef[3][lane] * y2;
         const double t297 = work[139][lane] + work[432][lane];
@@ -3130,7 +3130,7 @@ spin_chain5_APART static void spin_chain5_linearise_lanes_part2(spin_chain5_lane
         const double t305 = work[7][lane] + (work[343][lane] + work[254][lane]);
         work[425][lane] = t208 + coef[30][lane] * z5;
         const double t307 = work[19][lane] + work[42][lane];
-        work[83][lane] = y1_ * t307;
+        work[83][lane] = y1 * t307;
         work[84][lane] = x3 * t298;
         work[85][lane] = coef[27][lane] * work[43][lane] + coef[29][lane] * work[44][lane];
         work[435][lane] = x1 * t297 + (work[83][lane] + (work[84][lane] + work[85][lane]));
@@ -3148,11 +3148,11 @@ spin_chain5_APART static void spin_chain5_linearise_lanes_part2(spin_chain5_lane
         const double t322 = work[28][lane] + work[47][lane];
         work[68][lane] = x1 * t322;
         work[70][lane] = coef[27][lane] * work[44][lane] + coef[29][lane] * work[43][lane] + y3 * t291;
-        work[433][lane] = work[68][lane] + (y1_ * t290 + work[70][lane]);
+        work[433][lane] = work[68][lane] + (y1 * t290 + work[70][lane]);
         const double t326 = z1 * t322;
         const double t327 = coef[29][lane] * work[39][lane] + coef[27][lane] * work[38][lane];
         const double t328 = y3 * t317;
-        work[438][lane] = y1_ * t314 + (t326 + (t327 + t328));
+        work[438][lane] = y1 * t314 + (t326 + (t327 + t328));
         const double t330 = z3 * (y2 * t305 + (t217 + (t218 + (y4 * work[425][lane] + t219)))) + (x5 * work[433][lane] + (work[48][lane] + (work[49][lane] + coef[28][lane] * y4) + z5 * work[438][lane]));
         work[414][lane] = x3 * (y2 * t280 + (t225 + (t227 + (y4 * work[430][lane] + t234)))) + t330;
         work[428][lane] = work[414][lane] * work[414][lane];
@@ -3176,7 +3176,7 @@ spin_chain5_APART static void spin_chain5_linearise_lanes_part2(spin_chain5_lane
         work[91][lane] = work[50][lane] + (work[276][lane] + work[144][lane]);
         work[95][lane] = work[51][lane] + coef[32][lane] * x4;
         work[138][lane] = coef[3][lane] * y3;
-        work[261][lane] = coef[20][lane] * y1_;
+        work[261][lane] = coef[20][lane] * y1;
         work[75][lane] = work[52][lane] + (work[138][lane] + work[261][lane]);
         work[78][lane] = coef[32][lane] * y4 + work[53][lane];
         work[366][lane] = coef[21][lane] * x4;
@@ -3184,7 +3184,7 @@ spin_chain5_APART static void spin_chain5_linearise_lanes_part2(spin_chain5_lane
         work[363][lane] = coef[21][lane] * y4;
         work[69][lane] = work[363][lane] + work[432][lane];
         const double t359 = x4 * (t315 + (t318 + (t316 + z3 * work[86][lane]))) + (coef[31][lane] * z5 + (work[54][lane] + t216) + y4 * (t326 + (t328 + (z3 * work[69][lane] + t327))));
-        work[97][lane] = x1 * (z2 * work[91][lane] + (work[55][lane] + (work[56][lane] + (z5 * work[95][lane] + work[57][lane])))) + (y1_ * (z2 * work[75][lane] + (work[58][lane] + (work[59][lane] + (z5 * work[78][lane] + work[60][lane])))) + t359);
+        work[97][lane] = x1 * (z2 * work[91][lane] + (work[55][lane] + (work[56][lane] + (z5 * work[95][lane] + work[57][lane])))) + (y1 * (z2 * work[75][lane] + (work[58][lane] + (work[59][lane] + (z5 * work[78][lane] + work[60][lane])))) + t359);
         work[96][lane] = work[97][lane] * work[97][lane];
         work[135][lane] = coef[3][lane] * z3;
         work[262][lane] = coef[20][lane] * z1;
@@ -3221,7 +3221,7 @@ spin_chain5_APART static void spin_chain5_linearise_lanes_part3(spin_chain5_lane
     spin_chain5_EACH_LANE
     for (int lane = 0; lane < spin_chain5_LANES; ++lane) {
         const double x1 = y[0][lane];
-        const double y1_ = y[1][lane];
+        const double y1 = y[1][lane];
         const double z1 = y[2][lane];
         const double x2 = y[3][lane];
         const double y2 = y[4][lane];
@@ -3239,7 +3239,7 @@ spin_chain5_APART static void spin_chain5_linearise_lanes_part3(spin_chain5_lane
         work[362][lane] = coef[21][lane] * z4;
         const double t366 = work[362][lane] + work[63][lane];
         const double t367 = z1 * (x2 * work[64][lane] + (work[65][lane] + (work[66][lane] + (work[67][lane] + x5 * work[472][lane])))) + (y4 * (work[68][lane] + (x3 * work[69][lane] + work[70][lane])) + (coef[31][lane] * x5 + (work[71][lane] + work[72][lane]) + z4 * (work[73][lane] + (x3 * t366 + work[74][lane]))));
-        work[454][lane] = y1_ * (x2 * work[75][lane] + (work[76][lane] + (work[77][lane] + (x5 * work[78][lane] + work[79][lane])))) + t367;
+        work[454][lane] = y1 * (x2 * work[75][lane] + (work[76][lane] + (work[77][lane] + (x5 * work[78][lane] + work[79][lane])))) + t367;
         work[507][lane] = work[454][lane] * work[454][lane];
         const double t369 = z1 * (y2 * work[64][lane] + (work[80][lane] + (work[81][lane] + (y5 * work[472][lane] + work[82][lane])))) + (x4 * (work[83][lane] + (work[84][lane] + (work[85][lane] + y3 * work[86][lane]))) + (coef[31][lane] * y5 + (work[87][lane] + work[88][lane]) + z4 * (work[89][lane] + (y3 * t366 + work[90][lane]))));
         work[453][lane] = x1 * (y2 * work[91][lane] + (work[92][lane] + (work[93][lane] + (work[94][lane] + y5 * work[95][lane])))) + t369;
@@ -3262,14 +3262,14 @@ spin_chain5_APART static void spin_chain5_linearise_lanes_part3(spin_chain5_lane
         work[180][lane] = z5 * work[98][lane] + z2 * work[99][lane];
         const double t387 = spin_chain5_phi1_lane(work[100][lane]);
         work[170][lane] = work[101][lane] * t387;
-        work[216][lane] = 0.5 * y1_;
+        work[216][lane] = 0.5 * y1;
         work[156][lane] = (work[102][lane] - work[103][lane]) * work[104][lane] + 2.0 * (work[105][lane] * work[170][lane]) - work[216][lane];
         const double t391 = y2 * work[106][lane];
         const double t392 = z2 * work[107][lane];
         const double t393 = y5 * (coef[11][lane] * y5);
         const double t394 = coef[10][lane] + z5 * (coef[11][lane] * z5);
         work[182][lane] = t391 + (t392 + (t393 + t394));
-        work[214][lane] = y1_ * work[108][lane];
+        work[214][lane] = y1 * work[108][lane];
         work[173][lane] = z1 * work[101][lane];
         work[176][lane] = work[109][lane] * t387;
         work[157][lane] = (work[214][lane] + work[173][lane]) * work[104][lane] + 2.0 * (work[105][lane] * work[176][lane]);
@@ -3289,15 +3289,15 @@ spin_chain5_APART static void spin_chain5_linearise_lanes_part3(spin_chain5_lane
         work[228][lane] = coef[13][lane] * z1;
         const double t414 = work[228][lane] + coef[5][lane] * z3;
         work[186][lane] = x2 * t414 + work[117][lane];
-        work[233][lane] = coef[9][lane] * y1_ + coef[6][lane] * y3;
+        work[233][lane] = coef[9][lane] * y1 + coef[6][lane] * y3;
         const double t417 = y2 * work[233][lane];
         const double t418 = z2 * (coef[6][lane] * z3 + coef[9][lane] * z1);
-        const double t419 = coef[8][lane] * y1_;
+        const double t419 = coef[8][lane] * y1;
         const double t420 = y5 * (work[118][lane] + t419);
         const double t421 = coef[8][lane] * z1;
         const double t422 = coef[0][lane] + z5 * (work[119][lane] + t421);
         work[188][lane] = t417 + (t418 + (t420 + t422));
-        work[227][lane] = coef[13][lane] * y1_;
+        work[227][lane] = coef[13][lane] * y1;
         const double t425 = work[227][lane] + coef[5][lane] * y3;
         work[187][lane] = x2 * t425 + work[120][lane];
         work[189][lane] = y2 * t414 + work[121][lane];
@@ -3354,7 +3354,7 @@ spin_chain5_APART static void spin_chain5_linearise_lanes_part3(spin_chain5_lane
         work[149][lane] = y2 * work[264][lane];
         work[266][lane] = work[128][lane] + t421;
         work[150][lane] = z2 * work[266][lane];
-        work[474][lane] = coef[7][lane] * y1_ + coef[1][lane] * y4;
+        work[474][lane] = coef[7][lane] * y1 + coef[1][lane] * y4;
         work[151][lane] = y5 * work[474][lane];
         work[152][lane] = coef[0][lane] + z5 * (coef[7][lane] * z1 + coef[1][lane] * z4);
         increment[13][lane] = work[449][lane];
@@ -3364,24 +3364,24 @@ spin_chain5_APART static void spin_chain5_linearise_lanes_part3(spin_chain5_lane
         displacement[13][lane] = work[488][lane] * work[451][lane] - 0.5 * work[449][lane];
         displacement[14][lane] = work[451][lane] * work[509][lane] - 0.5 * work[456][lane];
         increment_jacobian[15][lane] = z1 * work[182][lane] - x1 * work[180][lane] - work[101][lane];
-        increment_jacobian[30][lane] = x1 * work[181][lane] - y1_ * work[182][lane] + work[108][lane];
+        increment_jacobian[30][lane] = x1 * work[181][lane] - y1 * work[182][lane] + work[108][lane];
         jacobian[0][lane] = 1.0 + (work[180][lane] * work[156][lane] + (work[182][lane] * work[157][lane] + work[181][lane] * work[158][lane]) - (work[112][lane] + work[113][lane]) * work[104][lane]);
         jacobian[1][lane] = work[179][lane] - work[178][lane] + (work[183][lane] * work[156][lane] + (work[181][lane] * work[157][lane] + work[184][lane] * work[158][lane]));
-        increment_jacobian[1][lane] = y1_ * work[183][lane] - z1 * work[184][lane] + work[101][lane];
-        increment_jacobian[31][lane] = x1 * work[184][lane] - y1_ * work[181][lane] - work[109][lane];
+        increment_jacobian[1][lane] = y1 * work[183][lane] - z1 * work[184][lane] + work[101][lane];
+        increment_jacobian[31][lane] = x1 * work[184][lane] - y1 * work[181][lane] - work[109][lane];
         jacobian[2][lane] = work[220][lane] + work[219][lane] + (work[213][lane] * work[156][lane] + (work[180][lane] * work[157][lane] + work[183][lane] * work[158][lane]));
-        increment_jacobian[2][lane] = y1_ * work[213][lane] - z1 * work[183][lane] - work[108][lane];
+        increment_jacobian[2][lane] = y1 * work[213][lane] - z1 * work[183][lane] - work[108][lane];
         increment_jacobian[17][lane] = z1 * work[180][lane] - x1 * work[213][lane] + work[109][lane];
         increment_jacobian[18][lane] = z1 * work[188][lane] - x1 * work[186][lane];
         jacobian[3][lane] = work[186][lane] * work[156][lane] + (work[188][lane] * work[157][lane] + work[187][lane] * work[158][lane]);
-        increment_jacobian[3][lane] = y1_ * work[186][lane] - z1 * work[187][lane];
-        increment_jacobian[33][lane] = x1 * work[187][lane] - y1_ * work[188][lane];
+        increment_jacobian[3][lane] = y1 * work[186][lane] - z1 * work[187][lane];
+        increment_jacobian[33][lane] = x1 * work[187][lane] - y1 * work[188][lane];
         increment_jacobian[77][lane] = x2 * work[189][lane] - y2 * work[186][lane];
         increment_jacobian[19][lane] = z1 * work[191][lane] - x1 * work[189][lane];
         increment_jacobian[75][lane] = x2 * work[191][lane] - y2 * work[188][lane];
         jacobian[4][lane] = work[189][lane] * work[156][lane] + (work[191][lane] * work[157][lane] + work[190][lane] * work[158][lane]);
-        increment_jacobian[4][lane] = y1_ * work[189][lane] - z1 * work[190][lane];
-        increment_jacobian[34][lane] = x1 * work[190][lane] - y1_ * work[191][lane];
+        increment_jacobian[4][lane] = y1 * work[189][lane] - z1 * work[190][lane];
+        increment_jacobian[34][lane] = x1 * work[190][lane] - y1 * work[191][lane];
         increment_jacobian[76][lane] = x2 * work[190][lane] - y2 * work[187][lane];
         increment_jacobian[47][lane] = y2 * work[192][lane] - z2 * work[189][lane];
         increment_jacobian[62][lane] = z2 * work[186][lane] - x2 * work[192][lane];
@@ -3389,20 +3389,20 @@ spin_chain5_APART static void spin_chain5_linearise_lanes_part3(spin_chain5_lane
         increment_jacobian[45][lane] = y2 * work[194][lane] - z2 * work[191][lane];
         increment_jacobian[60][lane] = z2 * work[188][lane] - x2 * work[194][lane];
         jacobian[5][lane] = work[192][lane] * work[156][lane] + (work[194][lane] * work[157][lane] + work[193][lane] * work[158][lane]);
-        increment_jacobian[5][lane] = y1_ * work[192][lane] - z1 * work[193][lane];
-        increment_jacobian[35][lane] = x1 * work[193][lane] - y1_ * work[194][lane];
+        increment_jacobian[5][lane] = y1 * work[192][lane] - z1 * work[193][lane];
+        increment_jacobian[35][lane] = x1 * work[193][lane] - y1 * work[194][lane];
         increment_jacobian[46][lane] = y2 * work[193][lane] - z2 * work[190][lane];
         increment_jacobian[61][lane] = z2 * work[187][lane] - x2 * work[193][lane];
         increment_jacobian[21][lane] = z1 * work[197][lane] - x1 * work[195][lane];
         jacobian[6][lane] = work[195][lane] * work[156][lane] + (work[197][lane] * work[157][lane] + work[196][lane] * work[158][lane]);
-        increment_jacobian[6][lane] = y1_ * work[195][lane] - z1 * work[196][lane];
-        increment_jacobian[36][lane] = x1 * work[196][lane] - y1_ * work[197][lane];
+        increment_jacobian[6][lane] = y1 * work[195][lane] - z1 * work[196][lane];
+        increment_jacobian[36][lane] = x1 * work[196][lane] - y1 * work[197][lane];
         increment_jacobian[122][lane] = x3 * work[198][lane] - y3 * work[195][lane];
         increment_jacobian[22][lane] = z1 * work[200][lane] - x1 * work[198][lane];
         increment_jacobian[120][lane] = x3 * work[200][lane] - y3 * work[197][lane];
         jacobian[7][lane] = work[198][lane] * work[156][lane] + (work[200][lane] * work[157][lane] + work[199][lane] * work[158][lane]);
-        increment_jacobian[7][lane] = y1_ * work[198][lane] - z1 * work[199][lane];
-        increment_jacobian[37][lane] = x1 * work[199][lane] - y1_ * work[200][lane];
+        increment_jacobian[7][lane] = y1 * work[198][lane] - z1 * work[199][lane];
+        increment_jacobian[37][lane] = x1 * work[199][lane] - y1 * work[200][lane];
         increment_jacobian[121][lane] = x3 * work[199][lane] - y3 * work[196][lane];
         increment_jacobian[92][lane] = y3 * work[201][lane] - z3 * work[198][lane];
         increment_jacobian[107][lane] = z3 * work[195][lane] - x3 * work[201][lane];
@@ -3410,20 +3410,20 @@ spin_chain5_APART static void spin_chain5_linearise_lanes_part3(spin_chain5_lane
         increment_jacobian[90][lane] = y3 * work[203][lane] - z3 * work[200][lane];
         increment_jacobian[105][lane] = z3 * work[197][lane] - x3 * work[203][lane];
         jacobian[8][lane] = work[201][lane] * work[156][lane] + (work[203][lane] * work[157][lane] + work[202][lane] * work[158][lane]);
-        increment_jacobian[8][lane] = y1_ * work[201][lane] - z1 * work[202][lane];
-        increment_jacobian[38][lane] = x1 * work[202][lane] - y1_ * work[203][lane];
+        increment_jacobian[8][lane] = y1 * work[201][lane] - z1 * work[202][lane];
+        increment_jacobian[38][lane] = x1 * work[202][lane] - y1 * work[203][lane];
         increment_jacobian[91][lane] = y3 * work[202][lane] - z3 * work[199][lane];
         increment_jacobian[106][lane] = z3 * work[196][lane] - x3 * work[202][lane];
         increment_jacobian[24][lane] = z1 * work[206][lane] - x1 * work[204][lane];
         jacobian[9][lane] = work[204][lane] * work[156][lane] + (work[206][lane] * work[157][lane] + work[205][lane] * work[158][lane]);
-        increment_jacobian[9][lane] = y1_ * work[204][lane] - z1 * work[205][lane];
-        increment_jacobian[39][lane] = x1 * work[205][lane] - y1_ * work[206][lane];
+        increment_jacobian[9][lane] = y1 * work[204][lane] - z1 * work[205][lane];
+        increment_jacobian[39][lane] = x1 * work[205][lane] - y1 * work[206][lane];
         increment_jacobian[167][lane] = x4 * work[207][lane] - y4 * work[204][lane];
         increment_jacobian[25][lane] = z1 * work[209][lane] - x1 * work[207][lane];
         increment_jacobian[165][lane] = x4 * work[209][lane] - y4 * work[206][lane];
         jacobian[10][lane] = work[207][lane] * work[156][lane] + (work[209][lane] * work[157][lane] + work[208][lane] * work[158][lane]);
-        increment_jacobian[10][lane] = y1_ * work[207][lane] - z1 * work[208][lane];
-        increment_jacobian[40][lane] = x1 * work[208][lane] - y1_ * work[209][lane];
+        increment_jacobian[10][lane] = y1 * work[207][lane] - z1 * work[208][lane];
+        increment_jacobian[40][lane] = x1 * work[208][lane] - y1 * work[209][lane];
         increment_jacobian[166][lane] = x4 * work[208][lane] - y4 * work[205][lane];
         increment_jacobian[137][lane] = y4 * work[210][lane] - z4 * work[207][lane];
         increment_jacobian[152][lane] = z4 * work[204][lane] - x4 * work[210][lane];
@@ -3431,8 +3431,8 @@ spin_chain5_APART static void spin_chain5_linearise_lanes_part3(spin_chain5_lane
         increment_jacobian[135][lane] = y4 * work[212][lane] - z4 * work[209][lane];
         increment_jacobian[150][lane] = z4 * work[206][lane] - x4 * work[212][lane];
         jacobian[11][lane] = work[210][lane] * work[156][lane] + (work[212][lane] * work[157][lane] + work[211][lane] * work[158][lane]);
-        increment_jacobian[11][lane] = y1_ * work[210][lane] - z1 * work[211][lane];
-        increment_jacobian[41][lane] = x1 * work[211][lane] - y1_ * work[212][lane];
+        increment_jacobian[11][lane] = y1 * work[210][lane] - z1 * work[211][lane];
+        increment_jacobian[41][lane] = x1 * work[211][lane] - y1 * work[212][lane];
         increment_jacobian[136][lane] = y4 * work[211][lane] - z4 * work[208][lane];
         increment_jacobian[151][lane] = z4 * work[205][lane] - x4 * work[211][lane];
     }
@@ -3452,7 +3452,7 @@ spin_chain5_APART static void spin_chain5_linearise_lanes_part4(spin_chain5_lane
     spin_chain5_EACH_LANE
     for (int lane = 0; lane < spin_chain5_LANES; ++lane) {
         const double x1 = y[0][lane];
-        const double y1_ = y[1][lane];
+        const double y1 = y[1][lane];
         const double z1 = y[2][lane];
         const double x2 = y[3][lane];
         const double y2 = y[4][lane];
@@ -3467,7 +3467,7 @@ spin_chain5_APART static void spin_chain5_linearise_lanes_part4(spin_chain5_lane
         const double y5 = y[13][lane];
         const double z5 = y[14][lane];
         work[458][lane] = work[149][lane] + (work[150][lane] + (work[151][lane] + work[152][lane]));
-        const double t485 = work[138][lane] + (coef[12][lane] * y1_ + work[52][lane]);
+        const double t485 = work[138][lane] + (coef[12][lane] * y1 + work[52][lane]);
         work[461][lane] = x2 * t485 + (work[154][lane] + work[155][lane]);
         work[464][lane] = y2 * work[159][lane] + (work[160][lane] + work[161][lane]);
         const double t488 = work[144][lane] + (coef[12][lane] * x1 + work[50][lane]);
@@ -3501,39 +3501,39 @@ spin_chain5_APART static void spin_chain5_linearise_lanes_part4(spin_chain5_lane
         work[288][lane] = work[2][lane] * t510;
         work[318][lane] = 0.5 * y2;
         work[272][lane] = (work[3][lane] - work[226][lane]) * work[223][lane] + 2.0 * (work[224][lane] * work[288][lane]) - work[318][lane];
-        const double t519 = y1_ * (work[227][lane] + coef[19][lane] * y3);
+        const double t519 = y1 * (work[227][lane] + coef[19][lane] * y3);
         const double t520 = z1 * (work[228][lane] + coef[19][lane] * z3);
         const double t521 = y3 * (coef[18][lane] * y3);
         const double t522 = coef[17][lane] + z3 * (coef[18][lane] * z3);
         work[293][lane] = t519 + (t520 + (t521 + t522));
         const double t524 = coef[16][lane] * x3 + coef[6][lane] * x1;
         work[295][lane] = z1 * work[229][lane] + z3 * t524;
-        work[294][lane] = y1_ * work[229][lane] + y3 * t524;
+        work[294][lane] = y1 * work[229][lane] + y3 * t524;
         work[292][lane] = work[0][lane] * work[4][lane] * work[223][lane];
         work[291][lane] = 0.5 * work[2][lane];
         const double t529 = x1 * (work[232][lane] + coef[19][lane] * x3);
         const double t530 = x3 * (coef[18][lane] * x3);
         work[296][lane] = t529 + (t520 + (t530 + t522));
-        work[297][lane] = z1 * work[233][lane] + z3 * (coef[6][lane] * y1_ + coef[16][lane] * y3);
+        work[297][lane] = z1 * work[233][lane] + z3 * (coef[6][lane] * y1 + coef[16][lane] * y3);
         work[324][lane] = 0.5 * work[4][lane];
         work[323][lane] = work[0][lane] * work[2][lane] * work[223][lane];
         work[317][lane] = t529 + (t519 + (t530 + (coef[17][lane] + t521)));
-        const double t536 = y1_ * work[131][lane];
+        const double t536 = y1 * work[131][lane];
         const double t537 = z1 * work[126][lane];
         const double t538 = y3 * work[234][lane];
         const double t539 = coef[0][lane] + z3 * work[235][lane];
         work[299][lane] = t536 + (t537 + (t538 + t539));
         work[300][lane] = x1 * work[236][lane] + (work[237][lane] + work[238][lane]);
         work[301][lane] = x1 * work[239][lane] + (work[240][lane] + work[241][lane]);
-        work[302][lane] = y1_ * work[242][lane] + (work[243][lane] + work[244][lane]);
+        work[302][lane] = y1 * work[242][lane] + (work[243][lane] + work[244][lane]);
         const double t544 = x1 * work[132][lane];
         const double t545 = x3 * work[245][lane];
         work[303][lane] = t544 + (t537 + (t545 + t539));
-        work[304][lane] = y1_ * work[239][lane] + (work[246][lane] + work[247][lane]);
+        work[304][lane] = y1 * work[239][lane] + (work[246][lane] + work[247][lane]);
         work[305][lane] = z1 * work[242][lane] + (work[248][lane] + work[249][lane]);
         work[306][lane] = z1 * work[236][lane] + (work[250][lane] + work[251][lane]);
         work[307][lane] = t544 + (t536 + (t545 + (coef[0][lane] + t538)));
-        const double t551 = y1_ * work[252][lane];
+        const double t551 = y1 * work[252][lane];
         const double t552 = z1 * work[253][lane];
         const double t553 = z3 * (work[7][lane] + work[254][lane]);
         const double t554 = y3 * (work[255][lane] + work[27][lane]);
@@ -3543,15 +3543,15 @@ spin_chain5_APART static void spin_chain5_linearise_lanes_part4(spin_chain5_lane
         work[347][lane] = coef[15][lane] * z3 + work[136][lane];
         work[310][lane] = x1 * work[257][lane] + x3 * work[347][lane];
         work[356][lane] = work[143][lane] + coef[15][lane] * x3;
-        work[311][lane] = y1_ * work[258][lane] + y3 * work[356][lane];
+        work[311][lane] = y1 * work[258][lane] + y3 * work[356][lane];
         const double t562 = x1 * work[259][lane];
         const double t563 = x3 * (work[260][lane] + work[20][lane]);
         work[312][lane] = t562 + (t552 + (t563 + t553));
-        work[313][lane] = y1_ * work[257][lane] + y3 * work[347][lane];
+        work[313][lane] = y1 * work[257][lane] + y3 * work[347][lane];
         work[314][lane] = z3 * work[356][lane] + z1 * work[258][lane];
         work[316][lane] = t562 + (t551 + (t563 + t554));
         work[315][lane] = z3 * work[346][lane] + z1 * work[256][lane];
-        work[281][lane] = y1_ * (work[138][lane] + (work[52][lane] + work[261][lane]));
+        work[281][lane] = y1 * (work[138][lane] + (work[52][lane] + work[261][lane]));
         work[280][lane] = y3 * work[129][lane];
         work[277][lane] = z3 * work[128][lane];
         work[278][lane] = z1 * (work[135][lane] + (work[262][lane] + work[61][lane]));
@@ -3562,14 +3562,14 @@ spin_chain5_APART static void spin_chain5_linearise_lanes_part4(spin_chain5_lane
         work[271][lane] = x3 * work[275][lane] + x1 * work[266][lane];
         increment_jacobian[27][lane] = z1 * work[458][lane] - x1 * work[153][lane];
         jacobian[12][lane] = work[153][lane] * work[156][lane] + (work[458][lane] * work[157][lane] + work[461][lane] * work[158][lane]);
-        increment_jacobian[12][lane] = y1_ * work[153][lane] - z1 * work[461][lane];
-        increment_jacobian[42][lane] = x1 * work[461][lane] - y1_ * work[458][lane];
+        increment_jacobian[12][lane] = y1 * work[153][lane] - z1 * work[461][lane];
+        increment_jacobian[42][lane] = x1 * work[461][lane] - y1 * work[458][lane];
         increment_jacobian[212][lane] = x5 * work[464][lane] - y5 * work[153][lane];
         increment_jacobian[28][lane] = z1 * work[459][lane] - x1 * work[464][lane];
         increment_jacobian[210][lane] = x5 * work[459][lane] - y5 * work[458][lane];
         jacobian[13][lane] = work[464][lane] * work[156][lane] + (work[459][lane] * work[157][lane] + work[462][lane] * work[158][lane]);
-        increment_jacobian[13][lane] = y1_ * work[464][lane] - z1 * work[462][lane];
-        increment_jacobian[43][lane] = x1 * work[462][lane] - y1_ * work[459][lane];
+        increment_jacobian[13][lane] = y1 * work[464][lane] - z1 * work[462][lane];
+        increment_jacobian[43][lane] = x1 * work[462][lane] - y1 * work[459][lane];
         increment_jacobian[211][lane] = x5 * work[462][lane] - y5 * work[461][lane];
         increment_jacobian[182][lane] = y5 * work[463][lane] - z5 * work[464][lane];
         increment_jacobian[197][lane] = z5 * work[153][lane] - x5 * work[463][lane];
@@ -3577,8 +3577,8 @@ spin_chain5_APART static void spin_chain5_linearise_lanes_part4(spin_chain5_lane
         increment_jacobian[180][lane] = y5 * work[457][lane] - z5 * work[459][lane];
         increment_jacobian[195][lane] = z5 * work[458][lane] - x5 * work[457][lane];
         jacobian[14][lane] = work[463][lane] * work[156][lane] + (work[457][lane] * work[157][lane] + work[460][lane] * work[158][lane]);
-        increment_jacobian[14][lane] = y1_ * work[463][lane] - z1 * work[460][lane];
-        increment_jacobian[44][lane] = x1 * work[460][lane] - y1_ * work[457][lane];
+        increment_jacobian[14][lane] = y1 * work[463][lane] - z1 * work[460][lane];
+        increment_jacobian[44][lane] = x1 * work[460][lane] - y1 * work[457][lane];
         increment_jacobian[181][lane] = y5 * work[460][lane] - z5 * work[462][lane];
         increment_jacobian[196][lane] = z5 * work[461][lane] - x5 * work[460][lane];
         jacobian[15][lane] = work[178][lane] + work[179][lane] + (work[180][lane] * t499 + (work[181][lane] * t501 + work[182][lane] * t502));
@@ -3683,7 +3683,7 @@ spin_chain5_APART static void spin_chain5_linearise_lanes_part5(spin_chain5_lane
     spin_chain5_EACH_LANE
     for (int lane = 0; lane < spin_chain5_LANES; ++lane) {
         const double x1 = y[0][lane];
-        const double y1_ = y[1][lane];
+        const double y1 = y[1][lane];
         const double z1 = y[2][lane];
         const double x2 = y[3][lane];
         const double y2 = y[4][lane];
@@ -3698,8 +3698,8 @@ spin_chain5_APART static void spin_chain5_linearise_lanes_part5(spin_chain5_lane
         const double y5 = y[13][lane];
         const double z5 = y[14][lane];
         const double t578 = work[50][lane] + work[273][lane];
-        work[466][lane] = y3 * t578 + y1_ * work[274][lane];
-        work[470][lane] = y1_ * work[266][lane] + y3 * work[275][lane];
+        work[466][lane] = y3 * t578 + y1 * work[274][lane];
+        work[470][lane] = y1 * work[266][lane] + y3 * work[275][lane];
         const double t581 = x1 * (work[144][lane] + (work[50][lane] + work[276][lane]));
         const double t582 = x3 * work[134][lane];
         work[468][lane] = t581 + (t582 + work[277][lane] + work[278][lane]);
@@ -3914,7 +3914,7 @@ spin_chain5_APART static void spin_chain5_linearise_lanes_part6(spin_chain5_lane
     spin_chain5_EACH_LANE
     for (int lane = 0; lane < spin_chain5_LANES; ++lane) {
         const double x1 = y[0][lane];
-        const double y1_ = y[1][lane];
+        const double y1 = y[1][lane];
         const double z1 = y[2][lane];
         const double x3 = y[6][lane];
         const double y3 = y[7][lane];
@@ -3960,7 +3960,7 @@ spin_chain5_APART static void spin_chain5_linearise_lanes_part6(spin_chain5_lane
         const double t699 = t694 + (t683 + (t695 + (coef[28][lane] + t685)));
         const double t700 = y3 * work[364][lane];
         const double t701 = z3 * work[361][lane];
-        const double t702 = coef[1][lane] * y1_ + coef[27][lane] * y4;
+        const double t702 = coef[1][lane] * y1 + coef[27][lane] * y4;
         const double t703 = y5 * t702;
         const double t704 = coef[0][lane] + z5 * (coef[1][lane] * z1 + coef[27][lane] * z4);
         work[499][lane] = t700 + (t701 + (t703 + t704));
@@ -3970,7 +3970,7 @@ spin_chain5_APART static void spin_chain5_linearise_lanes_part6(spin_chain5_lane
         work[505][lane] = x3 * t706 + (x5 * t708 + work[431][lane]);
         const double t710 = work[432][lane] + (coef[30][lane] * y4 + work[348][lane]);
         const double t711 = coef[29][lane] * y4;
-        const double t712 = t711 + coef[2][lane] * y1_;
+        const double t712 = t711 + coef[2][lane] * y1;
         work[502][lane] = x3 * t710 + (x5 * t712 + work[433][lane]);
         const double t714 = work[434][lane] + (work[353][lane] + coef[30][lane] * x4);
         work[475][lane] = coef[29][lane] * x4;
@@ -4006,12 +4006,12 @@ spin_chain5_APART static void spin_chain5_linearise_lanes_part6(spin_chain5_lane
         work[493][lane] = work[453][lane] * t736;
         work[484][lane] = work[496][lane] + (2.0 * (work[452][lane] * work[493][lane]) - (work[455][lane] + work[456][lane]) * work[451][lane]);
         work[487][lane] = z1 * work[471][lane] + z4 * t719;
-        work[485][lane] = y1_ * work[78][lane];
+        work[485][lane] = y1 * work[78][lane];
         work[476][lane] = z1 * work[472][lane];
         work[486][lane] = y4 * t711;
         work[477][lane] = coef[31][lane] + z4 * t707;
         work[506][lane] = work[485][lane] + (work[476][lane] + (work[486][lane] + work[477][lane]));
-        work[482][lane] = y4 * t719 + y1_ * work[471][lane];
+        work[482][lane] = y4 * t719 + y1 * work[471][lane];
         work[478][lane] = work[454][lane] * work[453][lane] * work[451][lane];
         work[479][lane] = 0.5 * work[97][lane];
         work[480][lane] = z1 * work[474][lane] + z4 * t702;
@@ -4142,7 +4142,7 @@ spin_chain5_APART static void spin_chain5_linearise_lanes_part7(spin_chain5_lane
     spin_chain5_EACH_LANE
     for (int lane = 0; lane < spin_chain5_LANES; ++lane) {
         const double x1 = y[0][lane];
-        const double y1_ = y[1][lane];
+        const double y1 = y[1][lane];
         const double z1 = y[2][lane];
         const double x2 = y[3][lane];
         const double y2 = y[4][lane];
@@ -4172,7 +4172,7 @@ spin_chain5_APART static void spin_chain5_linearise_lanes_part7(spin_chain5_lane
         const double t770 = (t765 + work[508][lane]) * work[451][lane] + 2.0 * (work[509][lane] * work[489][lane]);
         const double t771 = work[510][lane] + (2.0 * (work[509][lane] * work[495][lane]) - (work[511][lane] + work[449][lane]) * work[451][lane]);
         const double t772 = (work[491][lane] - work[512][lane]) * work[451][lane] + 2.0 * (work[509][lane] * work[493][lane]) - t763;
-        const double t773 = y1_ * work[180][lane];
+        const double t773 = y1 * work[180][lane];
         const double t774 = z1 * work[181][lane];
         const double t775 = x1 * work[183][lane];
         const double t776 = y2 * work[295][lane];
@@ -4268,7 +4268,7 @@ spin_chain5_APART static void spin_chain5_evaluate_lanes_part1(spin_chain5_lanes
     spin_chain5_EACH_LANE
     for (int lane = 0; lane < spin_chain5_LANES; ++lane) {
         const double x1 = y[0][lane];
-        const double y1_ = y[1][lane];
+        const double y1 = y[1][lane];
         const double z1 = y[2][lane];
         const double x2 = y[3][lane];
         const double y2 = y[4][lane];
@@ -4298,7 +4298,7 @@ spin_chain5_APART static void spin_chain5_evaluate_lanes_part1(spin_chain5_lanes
         work[21][lane] = coef[3][lane] * y5;
         work[59][lane] = coef[3][lane] * y4;
         const double t16 = work[21][lane] + (coef[5][lane] * y2 + work[59][lane]);
-        const double t17 = y1_ * t4;
+        const double t17 = y1 * t4;
         const double t18 = coef[13][lane] * y2;
         const double t19 = t18 + coef[12][lane] * y5;
         work[30][lane] = y5 * z4;
@@ -4318,7 +4318,7 @@ spin_chain5_APART static void spin_chain5_evaluate_lanes_part1(spin_chain5_lanes
         const double t34 = coef[2][lane] * z4 + work[70][lane];
         work[32][lane] = coef[0][lane] * z5;
         const double t36 = coef[0][lane] * z2;
-        work[79][lane] = y1_ * t24;
+        work[79][lane] = y1 * t24;
         work[80][lane] = y3 * t28;
         work[81][lane] = y4 * t31;
         const double t40 = x5 * (work[71][lane] + (work[72][lane] + (work[73][lane] + x5 * t34))) + (work[32][lane] + (coef[10][lane] * z1 + t36) + y5 * (work[79][lane] + (work[80][lane] + (y5 * t34 + work[81][lane]))));
@@ -4345,24 +4345,24 @@ spin_chain5_APART static void spin_chain5_evaluate_lanes_part1(spin_chain5_lanes
         work[48][lane] = coef[1][lane] * y5;
         const double t61 = coef[4][lane] * y3 + work[48][lane];
         work[78][lane] = x4 * t61;
-        work[60][lane] = coef[11][lane] * y1_;
+        work[60][lane] = coef[11][lane] * y1;
         const double t64 = work[60][lane] + coef[2][lane] * y4;
         work[52][lane] = coef[0][lane] * y5;
         work[6][lane] = coef[0][lane] * y2;
         work[66][lane] = z1 * t55;
         work[67][lane] = z3 * t58;
         work[68][lane] = z4 * t61;
-        const double t70 = x5 * (work[76][lane] + (work[77][lane] + (work[78][lane] + x5 * t64))) + (work[52][lane] + (work[6][lane] + coef[10][lane] * y1_) + z5 * (work[66][lane] + (work[67][lane] + (work[68][lane] + z5 * t64))));
-        const double p_y1 = x2 * (y3 * work[7][lane] + (t42 + (y1_ * t7 + t48))) + (z2 * (y3 * work[12][lane] + (y1_ * t52 + t54)) + t70);
+        const double t70 = x5 * (work[76][lane] + (work[77][lane] + (work[78][lane] + x5 * t64))) + (work[52][lane] + (work[6][lane] + coef[10][lane] * y1) + z5 * (work[66][lane] + (work[67][lane] + (work[68][lane] + z5 * t64))));
+        const double p_y1 = x2 * (y3 * work[7][lane] + (t42 + (y1 * t7 + t48))) + (z2 * (y3 * work[12][lane] + (y1 * t52 + t54)) + t70);
         const double t71 = coef[9][lane] * x2 + coef[8][lane] * x5;
         const double t72 = coef[6][lane] * x2;
         const double t73 = coef[4][lane] * x4 + t72;
         work[10][lane] = coef[4][lane] * work[40][lane] + coef[3][lane] * work[41][lane];
-        const double t75 = y1_ * t71 + (y3 * t73 + work[10][lane]);
+        const double t75 = y1 * t71 + (y3 * t73 + work[10][lane]);
         const double t76 = coef[3][lane] * work[26][lane] + coef[4][lane] * work[27][lane];
         const double t77 = z1 * t71 + (t76 + z3 * t73);
         const double t78 = coef[8][lane] * x2 + coef[7][lane] * x5;
-        work[83][lane] = y1_ * t78;
+        work[83][lane] = y1 * t78;
         work[24][lane] = coef[4][lane] * x2;
         const double t81 = work[24][lane] + work[57][lane];
         work[84][lane] = y3 * t81;
@@ -4380,8 +4380,8 @@ spin_chain5_APART static void spin_chain5_evaluate_lanes_part1(spin_chain5_lanes
         const double p_x1 = y2 * (x3 * t16 + (x1 * t19 + t75)) + (z2 * (x3 * work[12][lane] + (x1 * t52 + t77)) + t93);
         const double t94 = spin_chain5_phi0_lane(p_z1 * p_z1 + (p_y1 * p_y1 + p_x1 * p_x1));
         const double t95 = z1 * p_x1 - x1 * p_z1;
-        const double t96 = x1 * p_y1 - y1_ * p_x1;
-        const double t97 = y1_ * p_z1 - z1 * p_y1;
+        const double t96 = x1 * p_y1 - y1 * p_x1;
+        const double t97 = y1 * p_z1 - z1 * p_y1;
         const double t98 = work[37][lane] + (work[69][lane] + coef[19][lane] * z2);
         const double t99 = coef[20][lane] * z5 + t51;
         const double t100 = coef[4][lane] * x5 + t72;
@@ -4396,7 +4396,7 @@ spin_chain5_APART static void spin_chain5_evaluate_lanes_part1(spin_chain5_lanes
         work[13][lane] = z1 * t108;
         const double t110 = coef[15][lane] * y4 + coef[16][lane] * y2;
         work[15][lane] = z3 * t110 + t22;
-        const double t112 = y1_ * (y3 * t98 + (y1_ * t99 + t54)) + (x3 * (t101 + (x3 * t103 + t105)) + (work[33][lane] + (coef[17][lane] * z2 + work[61][lane]) + y3 * (work[13][lane] + (y3 * t103 + work[15][lane]))));
+        const double t112 = y1 * (y3 * t98 + (y1 * t99 + t54)) + (x3 * (t101 + (x3 * t103 + t105)) + (work[33][lane] + (coef[17][lane] * z2 + work[61][lane]) + y3 * (work[13][lane] + (y3 * t103 + work[15][lane]))));
         const double p_z2 = x1 * (x3 * t98 + (x1 * t99 + t77)) + t112;
         const double t113 = work[19][lane] + (coef[19][lane] * x2 + work[57][lane]);
         const double t114 = coef[20][lane] * x5 + t6;
@@ -4411,17 +4411,17 @@ spin_chain5_APART static void spin_chain5_evaluate_lanes_part1(spin_chain5_lanes
         const double t123 = coef[15][lane] * z4 + coef[16][lane] * z2;
         const double t124 = x3 * t123;
         const double t125 = y3 * (work[8][lane] + (work[9][lane] + (y3 * t118 + work[10][lane]))) + (work[44][lane] + (work[75][lane] + coef[17][lane] * x2) + z3 * (t122 + (t124 + (t76 + z3 * t118))));
-        const double p_x2 = y1_ * (y3 * t113 + (t42 + (y1_ * t114 + t48))) + (z1 * (z3 * t113 + (t5 + (z1 * t114 + t13))) + t125);
+        const double p_x2 = y1 * (y3 * t113 + (t42 + (y1 * t114 + t48))) + (z1 * (z3 * t113 + (t5 + (z1 * t114 + t13))) + t125);
         const double t126 = z2 * p_x2 - x2 * p_z2;
         const double t127 = work[21][lane] + (coef[19][lane] * y2 + work[59][lane]);
         const double t128 = coef[20][lane] * y5 + t18;
-        const double t129 = y1_ * t100;
+        const double t129 = y1 * t100;
         const double t130 = coef[18][lane] * y2;
         const double t131 = t130 + coef[14][lane] * y4;
         const double t132 = y3 * t104 + t45;
         work[53][lane] = coef[0][lane] * y3;
-        work[82][lane] = coef[0][lane] * y1_;
-        const double t135 = y1_ * t121;
+        work[82][lane] = coef[0][lane] * y1;
+        const double t135 = y1 * t121;
         const double t136 = y3 * t123;
         const double t137 = z1 * (z3 * t127 + (t17 + (z1 * t128 + t23))) + (x3 * (t129 + (x3 * t131 + t132)) + (work[53][lane] + (work[82][lane] + coef[17][lane] * y2) + z3 * (t135 + (t136 + (z3 * t131 + t53)))));
         const double p_y2 = x1 * (x3 * t127 + (x1 * t128 + t75)) + t137;
@@ -4440,14 +4440,14 @@ spin_chain5_APART static void spin_chain5_evaluate_lanes_part1(spin_chain5_lanes
         const double t150 = work[42][lane] + coef[4][lane] * z1;
         work[47][lane] = x5 * t150;
         work[62][lane] = coef[0][lane] * z4;
-        work[49][lane] = y1_ * t143;
+        work[49][lane] = y1 * t143;
         work[50][lane] = y3 * t145;
         work[51][lane] = y5 * t150;
         const double t156 = x4 * (work[45][lane] + (work[46][lane] + (x4 * t148 + work[47][lane]))) + (work[62][lane] + (coef[24][lane] * z3 + t36) + y4 * (work[49][lane] + (work[50][lane] + (work[51][lane] + y4 * t148))));
         work[17][lane] = x2 * (z1 * work[7][lane] + (t122 + (t124 + (t76 + z3 * work[11][lane])))) + (y2 * (z1 * t16 + (t135 + (t136 + (t53 + z3 * t142)))) + t156);
         work[14][lane] = t102 + coef[26][lane] * z4;
         const double t158 = work[24][lane] + work[19][lane];
-        work[54][lane] = y1_ * t158;
+        work[54][lane] = y1 * t158;
         const double t160 = coef[23][lane] * x4 + coef[15][lane] * x2;
         work[55][lane] = y3 * t160;
         work[20][lane] = coef[25][lane] * x3;
@@ -4467,7 +4467,7 @@ spin_chain5_APART static void spin_chain5_evaluate_lanes_part1(spin_chain5_lanes
         work[1][lane] = coef[15][lane] * y2 + coef[23][lane] * y4;
         work[4][lane] = x3 * work[1][lane];
         work[28][lane] = coef[22][lane] * y4;
-        work[2][lane] = work[28][lane] + coef[4][lane] * y1_;
+        work[2][lane] = work[28][lane] + coef[4][lane] * y1;
         work[5][lane] = x5 * work[2][lane];
         increment[1][lane] = t95;
         increment[2][lane] = t96;
@@ -4495,7 +4495,7 @@ spin_chain5_APART static void spin_chain5_evaluate_lanes_part2(spin_chain5_lanes
     spin_chain5_EACH_LANE
     for (int lane = 0; lane < spin_chain5_LANES; ++lane) {
         const double x1 = y[0][lane];
-        const double y1_ = y[1][lane];
+        const double y1 = y[1][lane];
         const double z1 = y[2][lane];
         const double x2 = y[3][lane];
         const double y2 = y[4][lane];
@@ -4516,13 +4516,13 @@ spin_chain5_APART static void spin_chain5_evaluate_lanes_part2(spin_chain5_lanes
         const double t184 = z3 * work[1][lane];
         const double t185 = z5 * work[2][lane];
         const double t186 = x4 * (work[3][lane] + (work[4][lane] + (work[5][lane] + x4 * t181))) + (t182 + (coef[24][lane] * y3 + work[6][lane]) + z4 * (t183 + (t184 + (z4 * t181 + t185))));
-        const double p_y3 = x2 * (y1_ * work[7][lane] + (work[8][lane] + (work[9][lane] + (work[10][lane] + y3 * work[11][lane])))) + (z2 * (y1_ * work[12][lane] + (work[13][lane] + (y3 * work[14][lane] + work[15][lane]))) + t186);
+        const double p_y3 = x2 * (y1 * work[7][lane] + (work[8][lane] + (work[9][lane] + (work[10][lane] + y3 * work[11][lane])))) + (z2 * (y1 * work[12][lane] + (work[13][lane] + (y3 * work[14][lane] + work[15][lane]))) + t186);
         const double t187 = x3 * p_y3 - y3 * work[16][lane];
         const double t188 = spin_chain5_phi0_lane(work[17][lane] * work[17][lane] + (work[16][lane] * work[16][lane] + p_y3 * p_y3));
         const double t189 = y3 * work[17][lane] - z3 * p_y3;
         const double t190 = work[19][lane] + (coef[14][lane] * x3 + coef[3][lane] * x1);
         const double t191 = coef[30][lane] * x5 + work[20][lane];
-        const double t192 = work[21][lane] + (coef[14][lane] * y3 + coef[3][lane] * y1_);
+        const double t192 = work[21][lane] + (coef[14][lane] * y3 + coef[3][lane] * y1);
         const double t193 = coef[30][lane] * y5 + t180;
         const double t194 = work[22][lane] + work[23][lane];
         const double t195 = x1 * t194;
@@ -4530,7 +4530,7 @@ spin_chain5_APART static void spin_chain5_evaluate_lanes_part2(spin_chain5_lanes
         const double t197 = coef[2][lane] * x5 + t196;
         const double t198 = work[24][lane] + work[25][lane];
         const double t199 = coef[27][lane] * work[26][lane] + coef[29][lane] * work[27][lane] + z3 * t198;
-        const double t200 = y1_ * t194;
+        const double t200 = y1 * t194;
         const double t201 = coef[3][lane] * y2;
         const double t202 = coef[2][lane] * y5 + t201;
         const double t203 = work[28][lane] + work[29][lane];
@@ -4540,7 +4540,7 @@ spin_chain5_APART static void spin_chain5_evaluate_lanes_part2(spin_chain5_lanes
         const double t206 = work[37][lane] + (coef[3][lane] * z1 + coef[14][lane] * z3);
         const double t207 = work[38][lane] + coef[30][lane] * z5;
         const double t208 = work[24][lane] + work[39][lane];
-        const double t209 = y1_ * t208;
+        const double t209 = y1 * t208;
         const double t210 = x3 * t203;
         const double t211 = coef[27][lane] * work[40][lane] + coef[29][lane] * work[41][lane];
         const double t212 = coef[3][lane] * z2;
@@ -4557,7 +4557,7 @@ spin_chain5_APART static void spin_chain5_evaluate_lanes_part2(spin_chain5_lanes
         const double t222 = z1 * t219;
         const double t223 = coef[29][lane] * work[31][lane] + coef[27][lane] * work[30][lane];
         const double t224 = y3 * t216;
-        const double t225 = z3 * (y2 * t206 + (work[49][lane] + (work[50][lane] + (y4 * t207 + work[51][lane])))) + (x5 * (t220 + (y1_ * t197 + t221)) + (work[52][lane] + (work[53][lane] + coef[28][lane] * y4) + z5 * (y1_ * t213 + (t222 + (t223 + t224)))));
+        const double t225 = z3 * (y2 * t206 + (work[49][lane] + (work[50][lane] + (y4 * t207 + work[51][lane])))) + (x5 * (t220 + (y1 * t197 + t221)) + (work[52][lane] + (work[53][lane] + coef[28][lane] * y4) + z5 * (y1 * t213 + (t222 + (t223 + t224)))));
         const double p_y4 = x3 * (y2 * t190 + (work[54][lane] + (work[55][lane] + (y4 * t191 + work[56][lane])))) + t225;
         const double t226 = spin_chain5_phi0_lane(p_z4 * p_z4 + (p_x4 * p_x4 + p_y4 * p_y4));
         const double t227 = z4 * p_x4 - x4 * p_z4;
@@ -4565,17 +4565,17 @@ spin_chain5_APART static void spin_chain5_evaluate_lanes_part2(spin_chain5_lanes
         const double t229 = y4 * p_z4 - z4 * p_y4;
         const double t230 = work[57][lane] + (coef[20][lane] * x1 + coef[3][lane] * x3);
         const double t231 = work[58][lane] + coef[32][lane] * x4;
-        const double t232 = work[59][lane] + (coef[3][lane] * y3 + coef[20][lane] * y1_);
+        const double t232 = work[59][lane] + (coef[3][lane] * y3 + coef[20][lane] * y1);
         const double t233 = coef[32][lane] * y4 + work[60][lane];
         const double t234 = coef[21][lane] * x4 + t196;
         const double t235 = coef[21][lane] * y4 + t201;
         const double t236 = x4 * (t214 + (t217 + (t215 + z3 * t234))) + (coef[31][lane] * z5 + (work[61][lane] + work[62][lane]) + y4 * (t222 + (t224 + (z3 * t235 + t223))));
-        const double p_z5 = x1 * (z2 * t230 + (work[63][lane] + (work[64][lane] + (z5 * t231 + work[65][lane])))) + (y1_ * (z2 * t232 + (work[66][lane] + (work[67][lane] + (z5 * t233 + work[68][lane])))) + t236);
+        const double p_z5 = x1 * (z2 * t230 + (work[63][lane] + (work[64][lane] + (z5 * t231 + work[65][lane])))) + (y1 * (z2 * t232 + (work[66][lane] + (work[67][lane] + (z5 * t233 + work[68][lane])))) + t236);
         const double t237 = work[69][lane] + (coef[3][lane] * z3 + coef[20][lane] * z1);
         const double t238 = work[70][lane] + coef[32][lane] * z4;
         const double t239 = coef[21][lane] * z4 + t212;
         const double t240 = z1 * (x2 * t237 + (work[71][lane] + (work[72][lane] + (work[73][lane] + x5 * t238)))) + (y4 * (t220 + (x3 * t235 + t221)) + (coef[31][lane] * x5 + (work[74][lane] + work[75][lane]) + z4 * (t195 + (x3 * t239 + t199))));
-        const double p_x5 = y1_ * (x2 * t232 + (work[76][lane] + (work[77][lane] + (x5 * t233 + work[78][lane])))) + t240;
+        const double p_x5 = y1 * (x2 * t232 + (work[76][lane] + (work[77][lane] + (x5 * t233 + work[78][lane])))) + t240;
         const double t241 = z1 * (y2 * t237 + (work[79][lane] + (work[80][lane] + (y5 * t238 + work[81][lane])))) + (x4 * (t209 + (t210 + (t211 + y3 * t234))) + (coef[31][lane] * y5 + (work[82][lane] + t182) + z4 * (t200 + (y3 * t239 + t204))));
         const double p_y5 = x1 * (y2 * t230 + (work[83][lane] + (work[84][lane] + (work[85][lane] + y5 * t231)))) + t241;
         const double t242 = spin_chain5_phi0_lane(p_z5 * p_z5 + (p_x5 * p_x5 + p_y5 * p_y5));
@@ -5324,7 +5324,7 @@ spin_chain5_status spin_chain5_ensemble(const spin_chain5_params *params, double
 static void spin_chain5_energy(const spin_chain5_params *params, const double x[15], double energy[restrict 1])
 {
     const double x1 = x[0];
-    const double y1_ = x[1];
+    const double y1 = x[1];
     const double z1 = x[2];
     const double x2 = x[3];
     const double y2 = x[4];
@@ -5338,8 +5338,8 @@ static void spin_chain5_energy(const spin_chain5_params *params, const double x[
     const double x5 = x[12];
     const double y5 = x[13];
     const double z5 = x[14];
-    const double t1 = y3 * y4 + (x3 * x4 + (z2 * z3 + (y2 * y3 + (x2 * x3 + (z1 * z2 + (x1 * x2 + y1_ * y2))))));
-    const double t2 = params->J * (z1 * z5 + (y1_ * y5 + (x1 * x5 + (z4 * z5 + (y4 * y5 + (x4 * x5 + (z3 * z4 + t1)))))));
+    const double t1 = y3 * y4 + (x3 * x4 + (z2 * z3 + (y2 * y3 + (x2 * x3 + (z1 * z2 + (x1 * x2 + y1 * y2))))));
+    const double t2 = params->J * (z1 * z5 + (y1 * y5 + (x1 * x5 + (z4 * z5 + (y4 * y5 + (x4 * x5 + (z3 * z4 + t1)))))));
     energy[0] = -t2;
 }
 
@@ -5349,7 +5349,7 @@ static void spin_chain5_casimir_values(const spin_chain5_params *params, const d
 {
     (void)params;
     const double x1 = x[0];
-    const double y1_ = x[1];
+    const double y1 = x[1];
     const double z1 = x[2];
     const double x2 = x[3];
     const double y2 = x[4];
@@ -5363,7 +5363,7 @@ static void spin_chain5_casimir_values(const spin_chain5_params *params, const d
     const double x5 = x[12];
     const double y5 = x[13];
     const double z5 = x[14];
-    out[0] = z1 * z1 + (y1_ * y1_ + x1 * x1);
+    out[0] = z1 * z1 + (y1 * y1 + x1 * x1);
     out[1] = z2 * z2 + (x2 * x2 + y2 * y2);
     out[2] = z3 * z3 + (x3 * x3 + y3 * y3);
     out[3] = z4 * z4 + (y4 * y4 + x4 * x4);
@@ -5374,7 +5374,7 @@ static void spin_chain5_casimir_values(const spin_chain5_params *params, const d
 static void spin_chain5_field(const spin_chain5_params *params, const double x[15], double out[restrict 15])
 {
     const double x1 = x[0];
-    const double y1_ = x[1];
+    const double y1 = x[1];
     const double z1 = x[2];
     const double x2 = x[3];
     const double y2 = x[4];
@@ -5397,7 +5397,7 @@ static void spin_chain5_field(const spin_chain5_params *params, const double x[1
     const double t7 = params->J * x5;
     const double t8 = params->J * x2;
     const double t9 = t7 + t8;
-    const double t10 = params->J * y1_;
+    const double t10 = params->J * y1;
     const double t11 = params->J * y3;
     const double t12 = t10 + t11;
     const double t13 = params->J * z1;
@@ -5418,9 +5418,9 @@ static void spin_chain5_field(const spin_chain5_params *params, const double x[1
     const double t28 = t10 + t19;
     const double t29 = t21 + t13;
     const double t30 = t23 + t17;
-    out[0] = z1 * t3 - y1_ * t6;
+    out[0] = z1 * t3 - y1 * t6;
     out[1] = x1 * t6 - z1 * t9;
-    out[2] = y1_ * t9 - x1 * t3;
+    out[2] = y1 * t9 - x1 * t3;
     out[3] = z2 * t12 - y2 * t15;
     out[4] = x2 * t15 - z2 * t18;
     out[5] = y2 * t18 - x2 * t12;

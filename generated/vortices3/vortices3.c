@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 46b52baefeee4d44145fb89b10e5b2f37945ea8fad6252c7b81b23a7b4071c91
+ * body-sha256: dce9366ce9bbdec26eafc261abd5a701a91a036baeddff0628329945d98988ec
  */
 #include "vortices3.h"
 
@@ -55,18 +55,18 @@ vortices3_APART static void vortices3_linearise_part1(const double coef[3], cons
                                                       double work[restrict 218])
 {
     const double x1 = y[0];
-    const double y1_ = y[1];
+    const double y1 = y[1];
     const double x2 = y[2];
     const double y2 = y[3];
     const double x3 = y[4];
     const double y3 = y[5];
     work[6] = x1 - x3;
-    work[4] = y1_ - y3;
+    work[4] = y1 - y3;
     work[23] = 1.0 / (work[6] * work[6] + work[4] * work[4]);
     work[9] = coef[0] * work[23];
     const double t5 = 0.25 * (work[6] * work[9]);
     work[3] = x1 - x2;
-    work[0] = y1_ - y2;
+    work[0] = y1 - y2;
     work[12] = 1.0 / (work[0] * work[0] + work[3] * work[3]);
     work[8] = coef[0] * work[12];
     const double t10 = work[3] * work[8];
@@ -273,7 +273,7 @@ vortices3_APART static void vortices3_linearise_part2(const double coef[3], cons
 {
     (void)displacement;
     (void)increment;
-    const double y1_ = y[1];
+    const double y1 = y[1];
     const double y2 = y[3];
     const double t180 = work[0] * work[1];
     const double t181 = coef[0] * t180;
@@ -346,7 +346,7 @@ vortices3_APART static void vortices3_linearise_part2(const double coef[3], cons
     const double t248 = work[32] - work[177] + (1.0 / 12.0 * (work[28] * t227) + 2.0 * (work[4] * t235));
     const double t249 = 0.5 * (t248 + t245);
     const double t250 = t246 - t249;
-    const double t251 = coef[2] * (y2 - y1_) + coef[1] * (1.0 / 3.0 * (work[10] * t242) + 1.0 / 3.0 * (work[7] * t202)) + (1.0 / 12.0 * (work[15] * t205) + work[11] * t210) + (1.0 / 12.0 * (work[14] * t206) + work[13] * t208 + coef[0] * (work[2] + work[0] * t240 + work[3] * t250));
+    const double t251 = coef[2] * (y2 - y1) + coef[1] * (1.0 / 3.0 * (work[10] * t242) + 1.0 / 3.0 * (work[7] * t202)) + (1.0 / 12.0 * (work[15] * t205) + work[11] * t210) + (1.0 / 12.0 * (work[14] * t206) + work[13] * t208 + coef[0] * (work[2] + work[0] * t240 + work[3] * t250));
     const double t252 = 4.0 * work[135] - work[1] * t251;
     const double t253 = work[33] - work[134] + (2.0 * (t192 * work[34]) + work[8] * t240) + (2.0 * (work[10] * t213) + 2.0 * (work[0] * t252));
     work[202] = 2.0 * work[35];
@@ -1148,18 +1148,18 @@ vortices3_APART static void vortices3_linearise_lanes_part1(vortices3_lanes coef
     vortices3_EACH_LANE
     for (int lane = 0; lane < vortices3_LANES; ++lane) {
         const double x1 = y[0][lane];
-        const double y1_ = y[1][lane];
+        const double y1 = y[1][lane];
         const double x2 = y[2][lane];
         const double y2 = y[3][lane];
         const double x3 = y[4][lane];
         const double y3 = y[5][lane];
         work[6][lane] = x1 - x3;
-        work[4][lane] = y1_ - y3;
+        work[4][lane] = y1 - y3;
         work[23][lane] = 1.0 / (work[6][lane] * work[6][lane] + work[4][lane] * work[4][lane]);
         work[9][lane] = coef[0][lane] * work[23][lane];
         const double t5 = 0.25 * (work[6][lane] * work[9][lane]);
         work[3][lane] = x1 - x2;
-        work[0][lane] = y1_ - y2;
+        work[0][lane] = y1 - y2;
         work[12][lane] = 1.0 / (work[0][lane] * work[0][lane] + work[3][lane] * work[3][lane]);
         work[8][lane] = coef[0][lane] * work[12][lane];
         const double t10 = work[3][lane] * work[8][lane];
@@ -1369,7 +1369,7 @@ vortices3_APART static void vortices3_linearise_lanes_part2(vortices3_lanes coef
     (void)increment;
     vortices3_EACH_LANE
     for (int lane = 0; lane < vortices3_LANES; ++lane) {
-        const double y1_ = y[1][lane];
+        const double y1 = y[1][lane];
         const double y2 = y[3][lane];
         const double t180 = work[0][lane] * work[1][lane];
         const double t181 = coef[0][lane] * t180;
@@ -1442,7 +1442,7 @@ vortices3_APART static void vortices3_linearise_lanes_part2(vortices3_lanes coef
         const double t248 = work[32][lane] - work[177][lane] + (1.0 / 12.0 * (work[28][lane] * t227) + 2.0 * (work[4][lane] * t235));
         const double t249 = 0.5 * (t248 + t245);
         const double t250 = t246 - t249;
-        const double t251 = coef[2][lane] * (y2 - y1_) + coef[1][lane] * (1.0 / 3.0 * (work[10][lane] * t242) + 1.0 / 3.0 * (work[7][lane] * t202)) + (1.0 / 12.0 * (work[15][lane] * t205) + work[11][lane] * t210) + (1.0 / 12.0 * (work[14][lane] * t206) + work[13][lane] * t208 + coef[0][lane] * (work[2][lane] + work[0][lane] * t240 + work[3][lane] * t250));
+        const double t251 = coef[2][lane] * (y2 - y1) + coef[1][lane] * (1.0 / 3.0 * (work[10][lane] * t242) + 1.0 / 3.0 * (work[7][lane] * t202)) + (1.0 / 12.0 * (work[15][lane] * t205) + work[11][lane] * t210) + (1.0 / 12.0 * (work[14][lane] * t206) + work[13][lane] * t208 + coef[0][lane] * (work[2][lane] + work[0][lane] * t240 + work[3][lane] * t250));
         const double t252 = 4.0 * work[135][lane] - work[1][lane] * t251;
         const double t253 = work[33][lane] - work[134][lane] + (2.0 * (t192 * work[34][lane]) + work[8][lane] * t240) + (2.0 * (work[10][lane] * t213) + 2.0 * (work[0][lane] * t252));
         work[202][lane] = 2.0 * work[35][lane];
@@ -1842,18 +1842,18 @@ static void vortices3_evaluate_lanes(vortices3_lanes coef[restrict 3], vortices3
     vortices3_EACH_LANE
     for (int lane = 0; lane < vortices3_LANES; ++lane) {
         const double x1 = y[0][lane];
-        const double y1_ = y[1][lane];
+        const double y1 = y[1][lane];
         const double x2 = y[2][lane];
         const double y2 = y[3][lane];
         const double x3 = y[4][lane];
         const double y3 = y[5][lane];
         const double t1 = x1 - x3;
-        const double t2 = y1_ - y3;
+        const double t2 = y1 - y3;
         const double t3 = 1.0 / (t1 * t1 + t2 * t2);
         const double t4 = coef[0][lane] * t3;
         const double t5 = 0.25 * (t1 * t4);
         const double t6 = x1 - x2;
-        const double t7 = y1_ - y2;
+        const double t7 = y1 - y2;
         const double t8 = 1.0 / (t7 * t7 + t6 * t6);
         const double t9 = coef[0][lane] * t8;
         const double t10 = t6 * t9;
@@ -2661,17 +2661,17 @@ static void vortices3_energy(const vortices3_params *params, const double x[6], 
 {
     (void)params;
     const double x1 = x[0];
-    const double y1_ = x[1];
+    const double y1 = x[1];
     const double x2 = x[2];
     const double y2 = x[3];
     const double x3 = x[4];
     const double y3 = x[5];
     const double t1 = y2 - y3;
     const double t2 = x2 - x3;
-    const double t3 = y1_ - y2;
+    const double t3 = y1 - y2;
     const double t4 = x1 - x2;
     const double t5 = x1 - x3;
-    const double t6 = y1_ - y3;
+    const double t6 = y1 - y3;
     const double t7 = log(t1 * t1 + t2 * t2) - (2.0 * log(t3 * t3 + t4 * t4) - 0.5 * log(t5 * t5 + t6 * t6));
     energy[0] = 0.25 * (t7 / 3.141592653589793);
 }
@@ -2689,17 +2689,17 @@ static void vortices3_field(const vortices3_params *params, const double x[6], d
 {
     (void)params;
     const double x1 = x[0];
-    const double y1_ = x[1];
+    const double y1 = x[1];
     const double x2 = x[2];
     const double y2 = x[3];
     const double x3 = x[4];
     const double y3 = x[5];
-    const double t1 = y1_ - y3;
+    const double t1 = y1 - y3;
     const double t2 = 1.0 / 3.141592653589793;
     const double t3 = x1 - x3;
     const double t4 = t2 / (t3 * t3 + t1 * t1);
     const double t5 = t1 * t4;
-    const double t6 = y1_ - y2;
+    const double t6 = y1 - y2;
     const double t7 = x1 - x2;
     const double t8 = t2 / (t6 * t6 + t7 * t7);
     const double t9 = t6 * t8;

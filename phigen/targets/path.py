@@ -12,6 +12,7 @@ from phigen.symbolic.expression import Expression, symbols_of
 from phigen.symbolic.symbols import COEFFICIENT, FIXED, SERIES, Symbol, coefficient, kind_of, momentum, variation
 from phigen.targets.names import Scope
 from phigen.targets.printer import Printer
+from phigen.targets.reserved import Reserved
 
 Text = Callable[[Expression], str]
 
@@ -68,7 +69,7 @@ def kinds(path: Recurrences) -> list[str]:
 
 
 def _scope(program: Program, path: Recurrences, syntax: Syntax, series: str) -> Scope:
-    scope = Scope(())
+    scope = Scope(Reserved())
     for i, c in enumerate(program.coordinates):
         scope.bind(momentum(c), syntax.covector.format(i=i))
     for i in range(program.step.coefficients):

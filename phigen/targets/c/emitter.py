@@ -9,6 +9,7 @@ from typing import Any
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.program import Program
 from phigen.scheme.steps import PLAUSIBLE, Explicit, Implicit, InnerSolve, Newton, Path, Splitting
+from phigen.spec.model import Parameter
 from phigen.targets import special
 from phigen.targets.c import extras, lanes, packs, small, splitting
 from phigen.targets.c.kernels import LANES, apart, function, members, printer, wrapped_arguments
@@ -96,9 +97,7 @@ def _values(program: Program) -> dict[str, object]:
         **_memory_lines(program),
         "coordinates": ", ".join(f"{c} = x[{i}]" for i, c in enumerate(program.coordinates)),
         "casimirs": ", ".join(f"{c} = out[{i}]" for i, c in enumerate(program.casimirs)) or "none",
-        "members": [
-            (f"double {member[p.name]};", plain(p.description) or f"default {float(p.value)!r}") for p in parameters
-        ]
+        "members": [(f"double {member[p.name]};", _about(p, member[p.name])) for p in parameters]
         or [("char unused;", "this system has no parameters")],
         "defaults": ", ".join(repr(float(p.value)) for p in parameters) or "0",
         "max_iterations": inner.max_iterations,
@@ -110,6 +109,12 @@ def _values(program: Program) -> dict[str, object]:
         **packs.values(program),
         "pivoting": f"{program.name}_solve" + ("_pivoting" if isinstance(step, Implicit) and step.eliminate else ""),
     }
+
+
+def _about(parameter: Parameter, member: str) -> str:
+    """The comment on a member of the struct; with the name of the spec where the member has another."""
+    said = plain(parameter.description) or f"default {float(parameter.value)!r}"
+    return said if member == parameter.name else f"{parameter.name}: {said}"
 
 
 def _memory_values(program: Program) -> dict[str, Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -13,8 +14,9 @@ from phigen.symbolic.special import SPECIAL
 from phigen.symbolic.symbols import WORK, Symbol, kind_of
 from phigen.targets.code import Code, lower, parts
 from phigen.targets.header import plain
-from phigen.targets.names import C_RESERVED, Scope
+from phigen.targets.names import Scope, identifiers
 from phigen.targets.printer import Printer
+from phigen.targets.reserved import C_RESERVED
 
 _SAME: tuple[str, ...] = ("exp", "expm1", "log", "sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sinh", "cosh")
 _SAME += ("tanh", "asinh", "acosh", "atanh", "sqrt", "cbrt", "log1p")
@@ -169,7 +171,8 @@ def wrapped_arguments(head: str, arguments: Sequence[str]) -> list[str]:
 def _body(program: Program, kernel: Kernel, form: Form, code: Code) -> list[str]:
     arrays = [*kernel.inputs, *(o.name for o in kernel.outputs), "work", "lane"]
     special = {f"function:{f}": form.functions.get(f, f"{program.name}_{f}") for f in (*SPECIAL, *ENTIRE)}
-    scope = Scope({*C_RESERVED, *arrays, *special.values(), *form.functions.values()})
+    called = re.findall(r"[A-Za-z_]\w*", " ".join([*special.values(), *form.functions.values()]))
+    scope = Scope(C_RESERVED | {*arrays, *called})
     for f, name in special.items():
         scope.bind(f, name)
     member = members(program)
@@ -221,8 +224,7 @@ def each_lane(program: Program) -> str:
 
 def members(program: Program) -> dict[str, str]:
     """The members of the parameter struct, by the names of the parameters."""
-    scope = Scope(C_RESERVED)
-    return {p.name: scope[p.name] for p in program.parameters}
+    return identifiers((p.name for p in program.parameters), C_RESERVED)
 
 
 def _comment(text: str) -> str:

@@ -15,6 +15,7 @@ from phigen.symbolic.symbols import FIXED, SERIES, Symbol, coefficient, momentum
 from phigen.targets.c.kernels import FUNCTIONS, each_lane, printer
 from phigen.targets.names import Scope
 from phigen.targets.rendering import render
+from phigen.targets.reserved import Reserved
 
 #: Most terms of the expansion of a path from its middle.
 TERMS = 16
@@ -145,7 +146,7 @@ class _Show:
 
     def __init__(self, program: Program, path: Recurrences, slopes: PathSlopes) -> None:
         self._base, self.dimension = len(path.series), program.dimension
-        scope = Scope(())
+        scope = Scope(Reserved())
         for i, c in enumerate(program.coordinates):
             scope.bind(momentum(c), f"e->p[{i}][lane]")
         for i in range(program.step.coefficients):

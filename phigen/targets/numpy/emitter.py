@@ -16,10 +16,11 @@ from phigen.symbolic.symbols import Symbol
 from phigen.targets import special
 from phigen.targets.code import Code, lower
 from phigen.targets.header import CHECKSUM, checksum, header_lines, plain
-from phigen.targets.names import PYTHON_RESERVED, Scope
+from phigen.targets.names import Scope
 from phigen.targets.path import Syntax, statements, tangent_program
 from phigen.targets.printer import Printer
 from phigen.targets.rendering import render
+from phigen.targets.reserved import PYTHON_RESERVED
 
 #: Most terms of the expansion of a path, as in the C target.
 TERMS = 30
@@ -174,7 +175,7 @@ def _function(program: Program, kernel: Kernel) -> str:
     arguments = ", ".join("parameters" if i == "params" else i for i in kernel.inputs)
     lines = [f"def _{kernel.name}({arguments}):", *_docstring(kernel.purpose)]
     own = (*SPECIAL, *ENTIRE)
-    scope = Scope({*PYTHON_RESERVED, *kernel.inputs, *(o.name for o in kernel.outputs), *(f"_{f}" for f in own)})
+    scope = Scope(PYTHON_RESERVED | {*kernel.inputs, *(o.name for o in kernel.outputs), *(f"_{f}" for f in own)})
     for f in own:
         scope.bind(f"function:{f}", f"_{f}")
     lines += _bindings(kernel, code, scope)
