@@ -20,7 +20,8 @@ from phigen.errors import Diagnostic, SpecError, ToolchainError
 from phigen.geometry.system import System, system_from_spec
 from phigen.spec import limits
 from phigen.spec.model import Extras, Spec
-from phigen.spec.names import IDENTIFIER, KEYWORDS, SCHEMES, SPEC_NAME
+from phigen.spec.names import ARGUMENT_HINT, ARGUMENTS, IDENTIFIER, SCHEMES, SPEC_NAME
+from phigen.spec.taken import objection
 
 if TYPE_CHECKING:
     from phigen.runtime.backend import Backend
@@ -139,9 +140,7 @@ def chosen_target(target: str) -> str:
 
 def _spec_of(system: System) -> Spec:
     """The spec of a system built in Python; the defaults of a spec file hold for the rest."""
-    _expect_name(system.name, SPEC_NAME, "lower-case letters, digits and _, starting with a letter, at most 31")
-    for name in (*system.coordinates, *system.parameter_names):
-        _expect_name(name, IDENTIFIER, "letters, digits and _, not starting with a digit")
+    _expect_names(system)
     return Spec(
         name=system.name,
         coordinates=system.coordinates,
@@ -154,7 +153,23 @@ def _spec_of(system: System) -> Spec:
     )
 
 
-def _expect_name(name: str, pattern: str, hint: str) -> None:
+def _expect_names(system: System) -> None:
     """sympy accepts any text as a name; the generated code does not."""
-    if not re.fullmatch(pattern, name) or (pattern == SPEC_NAME and name in KEYWORDS):
-        raise SpecError([Diagnostic(f"the name {name!r} cannot stand in generated code", hint=hint)])
+    problems = [objection(system.name)] if re.fullmatch(SPEC_NAME, system.name) else [_malformed(system.name, _HINT)]
+    problems += [
+        _malformed(name, "letters, digits and _, not starting with a digit")
+        for name in (*system.coordinates, *system.parameter_names)
+        if not re.fullmatch(IDENTIFIER, name)
+    ]
+    wrong = [name for name in system.parameter_names if name in ARGUMENTS]
+    problems += [(f"a parameter cannot be called {name!r}", ARGUMENT_HINT) for name in wrong]
+    found = [Diagnostic(message, hint=hint) for message, hint in filter(None, problems)]
+    if found:
+        raise SpecError(found)
+
+
+_HINT = "lower-case letters, digits and _, starting with a letter, at most 31"
+
+
+def _malformed(name: str, hint: str) -> tuple[str, str]:
+    return f"the name {name!r} cannot stand in generated code", hint

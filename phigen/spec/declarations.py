@@ -15,7 +15,7 @@ from typing import Any
 from phigen.spec.grammar import CONSTANTS, Scope, constant, names_in, parse
 from phigen.spec.kinds import Reader
 from phigen.spec.model import Parameter
-from phigen.spec.names import ARGUMENTS, SPEC_FUNCTIONS
+from phigen.spec.names import ARGUMENT_HINT, ARGUMENTS, SPEC_FUNCTIONS
 from phigen.spec.problems import did_you_mean, shown
 from phigen.spec.yaml_source import Node, Scalar
 from phigen.symbolic.expression import Expression, symbol, symbols_of
@@ -118,8 +118,7 @@ class Declarations:
             where = f"line {first.location.line}, column {first.location.column}"
             self.reader.error(node, f"the name {name!r} is declared twice; the first is in {where}")
         elif what == "parameter" and name in ARGUMENTS:
-            hint = "it is the name of an argument of the generated functions"
-            self.reader.error(node, f"a parameter cannot be called {name!r}", hint)
+            self.reader.error(node, f"a parameter cannot be called {name!r}", ARGUMENT_HINT)
         else:
             self.nodes[name] = node
             return True

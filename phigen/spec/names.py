@@ -13,25 +13,9 @@ SPEC_FUNCTIONS: dict[str, int] = {"sqrt": 1} | {f: n for f, n in FUNCTIONS.items
 SPEC_NAME = r"[a-z][a-z0-9_]{0,30}"
 IDENTIFIER = r"[A-Za-z_][A-Za-z0-9_]*"
 
-_C = """auto break case char const continue default do double else enum extern float for goto if inline int long
-register restrict return short signed sizeof static struct switch typedef union unsigned void volatile while
-bool true false nullptr constexpr thread_local alignas alignof static_assert typeof typeof_unqual"""
-_CPP = """and and_eq asm bitand bitor catch char8_t char16_t char32_t class compl concept consteval constinit
-const_cast co_await co_return co_yield decltype delete dynamic_cast explicit export friend mutable namespace new
-noexcept not not_eq operator or or_eq private protected public reinterpret_cast requires static_cast template this
-throw try typeid typename using virtual wchar_t xor xor_eq"""
-_PYTHON = """and as assert async await break class continue def del elif else except finally for from global if
-import in is lambda nonlocal not or pass raise return try while with yield match type"""
-KEYWORDS = frozenset(f"{_C} {_CPP} {_PYTHON}".split())
-
-#: NAME.h and NAME.py would hide these headers and modules, or cannot exist on Windows.
-_TAKEN = """assert complex ctype errno fenv float inttypes iso646 limits locale math setjmp signal stdalign stdarg
-stdatomic stdbool stddef stdint stdio stdlib stdnoreturn string tgmath threads time uchar wchar wctype
-numpy random operator types typing functools numbers warnings con prn aux nul"""
-TAKEN = frozenset(_TAKEN.split())
-
 #: Parameters are passed by keyword beside these arguments of the generated functions.
-ARGUMENTS = frozenset(["x", "x0", "X0", "h", "steps", "stride"])
+ARGUMENTS = frozenset(["x", "x0", "X0", "h", "steps", "stride", "gauge"])
+ARGUMENT_HINT = "it is the name of an argument of the generated functions"
 
 _LICENSES = """0BSD AFL-3.0 AGPL-3.0-only AGPL-3.0-or-later Apache-2.0 Artistic-2.0 BSD-1-Clause BSD-2-Clause
 BSD-2-Clause-Patent BSD-3-Clause BSD-3-Clause-Clear BSD-4-Clause BSL-1.0 CC-BY-4.0 CC-BY-SA-4.0 CC0-1.0 CECILL-2.1

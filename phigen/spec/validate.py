@@ -11,10 +11,11 @@ from phigen.spec.declarations import Declarations, declare
 from phigen.spec.fields import SPEC
 from phigen.spec.kinds import Reader
 from phigen.spec.model import BirealisationChoice, Extras, MatrixForm, SolverOptions, Spec
-from phigen.spec.names import KEYWORDS, LICENSE_REFERENCE, LICENSES, TAKEN
+from phigen.spec.names import LICENSE_REFERENCE, LICENSES
 from phigen.spec.poisson import poisson_form
 from phigen.spec.problems import Problems, counted, did_you_mean, shown
 from phigen.spec.runs import run, without_repetition
+from phigen.spec.taken import objection
 from phigen.spec.yaml_source import Scalar, decode, read
 from phigen.symbolic.expression import ZERO, Expression, symbol, symbols_of
 from phigen.symbolic.symbols import MATRIX, momentum
@@ -92,13 +93,9 @@ def _expect_consistent(raw: Mapping[str, Any], problems: Problems, reader: Reade
 def _name(node: Scalar | None, declared: Declarations) -> str:
     if node is None:
         return ""
-    if node.text in KEYWORDS:
-        declared.reader.error(
-            node, f"the spec name {node.text!r} is a keyword of C, C++ or Python", f"{node.text}_system would do"
-        )
-    elif node.text in TAKEN:
-        message = f"the spec name {node.text!r} would hide a standard header or module of that name"
-        declared.reader.error(node, message, f"{node.text}_system would do")
+    refused = objection(node.text)
+    if refused:
+        declared.reader.error(node, *refused)
     return node.text
 
 

@@ -13,7 +13,7 @@ from phigen.errors import SpecError
 from phigen.spec import loads, schema, starter
 from phigen.spec.fields import SPEC
 from phigen.spec.kinds import Either, Field, Kind, ListOf, MapOf, Record
-from phigen.spec.names import KEYWORDS, PLANNED, TAKEN
+from phigen.spec.names import PLANNED
 
 
 def conforms(text: str) -> bool:
@@ -105,7 +105,7 @@ def test_starter_loads_and_conforms_for_every_valid_name(name: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "name", ["", "A", "1a", "x" * 32, "a-b", "a b", "a\nb", "a: b", "{name}", "ünit", *sorted(KEYWORDS | TAKEN)]
+    "name", ["", "A", "1a", "x" * 32, "a-b", "a b", "a\nb", "a: b", "{name}", "ünit", "lambda", "re", "a_default"]
 )
 def test_starter_refuses_other_names(name: str) -> None:
     with pytest.raises(SpecError):

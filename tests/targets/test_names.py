@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from support import COMMAND, TARGETS, compile_text, files, run, solver, tool, write
+from support import COMMAND, TARGETS, compile_text, compiled, files, run, solver, tool, write
 
 from phigen.compiler import emit
 from phigen.scheme.steps import Explicit
@@ -192,6 +192,14 @@ def test_names_may_be_those_of_momenta_and_of_functions_that_are_called(tmp_path
     assert {"fabs(", "pow("} < set(re.findall(r"\w+\(", files(compilation, "c")["t.c"]))
     check_c(compilation, tmp_path)
     agree(compilation, np.array([0.3, 0.2, 0.5, 0.1]))
+
+
+def test_no_parameter_has_the_name_of_an_argument_of_the_generated_module():
+    tree = ast.parse(files(compiled("rigid_body"), "numpy")["rigid_body.py"])
+    offered = [n for n in tree.body if isinstance(n, ast.FunctionDef) and not n.name.startswith("_") and n.args.kwarg]
+    arguments = {a.arg for function in offered for a in function.args.args}
+    assert "gauge" in arguments
+    assert arguments <= ARGUMENTS
 
 
 def test_names_that_can_stand_stand_and_others_change_as_documented():

@@ -1,0 +1,72 @@
+"""Names that a spec cannot have.
+
+A spec gives its name to files, NAME.h and NAME.py, and its beginning to symbols, NAME_init. So the name must not hide a
+header or a module from whoever puts the folder of a solver on a search path, and symbols must be nobody else's.
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Callable
+
+_C = """auto break case char const continue default do double else enum extern float for goto if inline int long
+register restrict return short signed sizeof static struct switch typedef union unsigned void volatile while
+bool true false nullptr constexpr thread_local alignas alignof static_assert typeof typeof_unqual"""
+_CPP = """and and_eq asm bitand bitor catch char8_t char16_t char32_t class compl concept consteval constinit
+const_cast co_await co_return co_yield decltype delete dynamic_cast explicit export friend mutable namespace new
+noexcept not not_eq operator or or_eq private protected public reinterpret_cast requires static_cast template this
+throw try typeid typename using virtual wchar_t xor xor_eq"""
+_PYTHON = """and as assert async await break class continue def del elif else except finally for from global if
+import in is lambda nonlocal not or pass raise return try while with yield match type"""
+_KEYWORDS = frozenset(f"{_C} {_CPP} {_PYTHON}".split())
+
+# Headers of standard C, of POSIX and the libraries of Linux, macOS and Windows, and those of compilers: others include
+# them as <NAME.h>. Where file names have no case, <Availability.h> is meant too.
+_HEADERS = """assert complex ctype errno fenv float inttypes iso646 limits locale math setjmp signal stdalign stdarg
+stdatomic stdbit stdbool stdckdint stddef stdint stdio stdlib stdnoreturn string tgmath threads time uchar wchar wctype
+aio aliases alloca ar argp argz backtrace byteswap cpio crypt cxxabi dirent dlfcn elf endian envz err error execinfo
+fcntl features fmtmsg fnmatch fpu_control fstab fts ftw gconv getopt glob grp gshadow iconv ieee754 ifaddrs langinfo
+lastlog libgen libintl libio link malloc mcheck memory mntent monetary mqueue ndbm netdb nl_types nss obstack paths poll
+printf proc_service pthread pty pwd re_comp regex regexp resolv sched search semaphore sgtty shadow spawn stab stdio_ext
+strings stropts syscall sysexits syslog tar termio termios thread_db trace ttyent ucontext ulimit unistd ustat utime
+utmp utmpx values varargs wait wordexp xlocale availability block altivec builtins cet cpuid gcov intrin msa omp openacc
+quadmath stdfix syslimits unwind vadefs mm_malloc mm3dnow conio corecrt crtdbg crtdefs direct dos eh fibersapi io
+mbctype mbstring minmax minwindef process sal share tchar vcruntime winbase windef windows winerror winnt winsock
+winsock2"""
+_HEADER_FAMILIES = r"\w+intrin|(arm|hexagon|hvx|riscv|wasm)_\w+|ncurses\w*|curses"
+_HEADER = re.compile(rf"{'|'.join(_HEADERS.split())}|{_HEADER_FAMILIES}")
+
+# What is imported beside a generated module; modules of Python that this version does not have any more, or not yet.
+_MODULES = frozenset(["numpy", "scipy", "sympy", "matplotlib", "pandas", "phigen"])
+_OTHER_VERSIONS = frozenset(["annotationlib", "asynchat", "asyncore", "compression", "distutils", "imp", "smtpd"])
+
+_DEVICE = re.compile(r"con|prn|aux|nul|(com|lpt)[0-9]")
+
+# Functions of C libraries of the form X_init, X_status: linked into one program, ours would be called for theirs.
+_LIBRARY = re.compile(r"pthread_\w+|posix_\w+|inet6_\w+|argp_err_exit|acc|atomic|cnd|fanotify|inotify|mtx|res|sem|si")
+
+#: Symbols of one spec that are also those of another, which has a longer name: NAME_default_params is the default of
+#: NAME, and would be the type of the parameters of NAME_default.
+CLASHING_ENDS = {"default": "default_params", "modified": "modified_hamiltonian"}
+
+_HIDES = "would hide {} of that name from what is compiled or imported beside the solver"
+_REASONS: tuple[tuple[Callable[[str], object], str], ...] = (
+    (_KEYWORDS.__contains__, "is a keyword of C, C++ or Python"),
+    (_HEADER.fullmatch, _HIDES.format("the header")),
+    ((sys.stdlib_module_names | _MODULES | _OTHER_VERSIONS).__contains__, _HIDES.format("the Python module")),
+    (_DEVICE.fullmatch, "cannot be that of a file on Windows"),
+    (_LIBRARY.fullmatch, "begins functions of the C library, such as {name}_init"),
+)
+
+
+def objection(name: str) -> tuple[str, str] | None:
+    """Why no spec can have a name that is otherwise well formed, and what to do; None if it can have it."""
+    for refuses, reason in _REASONS:
+        if refuses(name):
+            return f"the spec name {name!r} {reason.format(name=name)}", f"{name}_system would do"
+    head, _, end = name.rpartition("_")
+    if head and end in CLASHING_ENDS:
+        message = f"the spec name {name!r} would clash with a spec {head!r}, whose code has {head}_{CLASHING_ENDS[end]}"
+        return message, f"{name}_system would do, or {end}_{head}"
+    return None

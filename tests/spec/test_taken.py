@@ -1,0 +1,117 @@
+"""The name of a spec hides no header and no module, and no two solvers in one program share a symbol."""
+
+import re
+import subprocess
+import sys
+
+import pytest
+from support import compile_text, files, tool
+
+from phigen import System, resources
+from phigen.errors import SpecError
+from phigen.spec.names import SPEC_NAME
+from phigen.spec.taken import CLASHING_ENDS, objection
+
+_STANDARD = """assert complex ctype errno fenv float inttypes iso646 limits locale math setjmp signal stdalign stdarg
+stdatomic stdbool stddef stdint stdio stdlib stdnoreturn string tgmath threads time uchar wchar wctype"""
+_POSIX = """aio cpio dirent dlfcn fcntl fmtmsg fnmatch ftw glob grp iconv langinfo libgen monetary mqueue ndbm netdb
+nl_types poll pthread pwd regex sched search semaphore spawn strings stropts syslog tar termios trace ulimit unistd
+utime utmpx wordexp features endian getopt alloca malloc memory obstack argp"""
+_CPP = "algorithm chrono complex filesystem fstream functional iostream map memory random regex string thread vector"
+
+
+def reached(compiler, language, names):
+    """The headers of the search path that these reach, without folder and suffix; those that are not there left out."""
+    text = "".join(f"#if __has_include(<{name}>)\n#include <{name}>\n#endif\n" for name in names)
+    command = [tool(compiler), "-x", language, "-E", "-M", "-v", "-"]
+    done = subprocess.run(command, input=text, capture_output=True, text=True, check=True)
+    searched = re.search(r"#include <\.\.\.> search starts here:\n(.*?)End of search list", done.stderr, re.DOTALL)
+    # Headers in backward/ are included by that name, not by their own.
+    folders = {line.strip() for line in searched[1].splitlines() if not line.endswith("/backward")}
+    paths = [path.rpartition("/") for path in done.stdout.split() if path.endswith(".h")]
+    return {file.removesuffix(".h") for folder, _, file in paths if folder in folders}
+
+
+@pytest.mark.parametrize("compiler", ["gcc", "clang"])
+def test_no_name_of_a_spec_hides_a_header_that_others_include(compiler):
+    plus = {"gcc": "g++", "clang": "clang++"}[compiler]
+    found = reached(compiler, "c", [f"{n}.h" for n in [*_STANDARD.split(), *_POSIX.split()]])
+    found |= reached(plus, "c++", _CPP.split())
+    assert {"features", "stdio", "stddef", "pthread"} <= found
+    assert [n for n in sorted(found) if re.fullmatch(SPEC_NAME, n) and objection(n) is None] == []
+
+
+def test_no_name_of_a_spec_hides_a_module_of_python_or_what_is_imported_beside_it():
+    modules = [*sys.stdlib_module_names, "numpy", "scipy", "sympy", "matplotlib", "phigen"]
+    assert [n for n in modules if re.fullmatch(SPEC_NAME, n) and objection(n) is None] == []
+
+
+def symbols(name, header):
+    """What a header declares with the prefix of the spec, without it."""
+    return set(re.findall(rf"\b{name}_(\w+)", re.sub(r"/\*.*?\*/", "", header, flags=re.DOTALL)))
+
+
+@pytest.fixture(scope="module")
+def declared():
+    """The symbols of all bundled solvers, and of one with everything that can be asked for."""
+    asked = compile_text(
+        "coordinates: [q, p]\npoisson: {canonical: {q: [q], p: [p]}}\nhamiltonian: q**2 + p**2\norder: 1\n"
+        "tangent: true\nmodified_hamiltonian: 1\n"
+    )
+    found = symbols("t", files(asked, "c")["t.h"])
+    for header in (resources.bundled_specs().parent / "generated").glob("*/*.h"):
+        found |= symbols(header.stem, header.read_text())
+    assert {"init", "init_gauge", "default_params", "step_tangent", "modified_hamiltonian"} < found
+    return found
+
+
+def test_no_two_specs_share_a_symbol(declared):
+    """NAME_SYMBOL is OTHER_SYMBOL for no OTHER = NAME_END but for the ends that are refused, which are all needed."""
+    clashing = {s.removesuffix(f"_{t}"): s for s in declared for t in declared if s.endswith(f"_{t}")}
+    assert clashing == CLASHING_ENDS
+    for end in CLASHING_ENDS:
+        assert f"a_{CLASHING_ENDS[end]}" in objection(f"a_{end}")[0]
+        assert objection(f"{end}_a") is None
+
+
+def test_no_symbol_of_a_solver_is_one_of_the_c_library(declared):
+    libraries = [
+        run_text(tool("gcc"), f"-print-file-name={name}") for name in ("libc.so.6", "libm.so.6", "libresolv.so.2")
+    ]
+    listed = run_text(tool("nm"), "-D", "--defined-only", *libraries)
+    known = {line.split()[-1].partition("@")[0] for line in listed.splitlines() if line.strip()}
+    assert {"sem_init", "printf"} < known
+    names = {s.removesuffix(f"_{t}") for s in known for t in declared if s.endswith(f"_{t}")}
+    assert [n for n in sorted(names) if re.fullmatch(SPEC_NAME, n) and objection(n) is None] == []
+
+
+def run_text(*command):
+    """What a command prints."""
+    return subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip()
+
+
+@pytest.mark.parametrize(
+    "name", ["wave_packet", "atom", "features2", "res_x", "default_body", "modified", "com10", "test"]
+)
+def test_other_names_are_free(name):
+    assert objection(name) is None
+
+
+@pytest.mark.parametrize(
+    ("name", "parameter", "complaint"),
+    [
+        ("math", "k", "hide the header"),
+        ("body_default", "k", "clash"),
+        ("body", "h", "called 'h'"),
+        ("Body", "k", "stand"),
+    ],
+)
+def test_systems_from_sympy_obey_the_same_rules(name, parameter, complaint):
+    import sympy
+
+    import phigen
+
+    q, p, k = sympy.symbols(["q", "p", parameter])
+    system = System.from_sympy([q, p], sympy.Matrix([[0, 1], [-1, 0]]), k * q**2 + p**2, {k: 1}, name=name)
+    with pytest.raises(SpecError, match=complaint):
+        phigen.compile(system)
