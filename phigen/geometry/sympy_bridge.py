@@ -1,11 +1,12 @@
-"""Between sympy and `Expression`: systems built in Python from sympy, and formulas for LaTeX.
+"""Between sympy and `Expression`: systems built in Python from sympy and given back to it, formulas for LaTeX.
 
-The only module that imports sympy; it is imported where it is needed, since that takes a quarter of a second.
+Only modules that need sympy import this one, since that takes a quarter of a second.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
@@ -80,15 +81,36 @@ def _node(e: Any, args: list[Expression]) -> Expression:
     raise SpecError([Diagnostic(f"{e} has no counterpart in phigen", hint=f"known functions: {', '.join(FUNCTIONS)}")])
 
 
-def to_sympy(e: Expression) -> Any:
-    """The expression in sympy, e.g. for ``sympy.latex``; the symbol ``p:x`` becomes ``p_x``."""
+def named_function(order: int, s: Any) -> Any:
+    """A derivative of φ (`phigen.symbolic.special`) as a symbol, as formulas print it."""
+    return sympy.Function(r"\varphi" + "'" * order)(s)
+
+
+def closed_function(order: int, s: Any) -> Any:
+    """A derivative of φ in closed form, φ(s) = (1 − (√s/2) cot(√s/2))/s."""
+    u = sympy.Dummy("u")
+    return sympy.diff((1 - sympy.sqrt(u) / 2 * sympy.cot(sympy.sqrt(u) / 2)) / u, u, order).subs(u, s)
+
+
+def to_sympy(
+    e: Expression,
+    symbols: Mapping[str, Any] | None = None,
+    special: Callable[[int, Any], Any] = named_function,
+) -> Any:
+    """The expression in sympy, e.g. for ``sympy.latex``.
+
+    ``symbols`` are those of sympy by their names here; others are real, and ``p:x`` becomes ``p_x``. ``special`` says
+    what the derivatives of φ become.
+    """
+    given = symbols or {}
 
     def visit(node: Expression, args: list[Any]) -> Any:
         match node.op:
             case "number":
                 return sympy.Rational(node.value.numerator, node.value.denominator)
             case "symbol":
-                return sympy.Symbol(plain(node.value).replace("λ_", "lambda_"), real=True)
+                own = plain(node.value).replace("λ_", "lambda_")
+                return given.get(node.value) or sympy.Symbol(own, real=True)
             case "pi":
                 return sympy.pi
             case "E":
@@ -116,7 +138,7 @@ def to_sympy(e: Expression) -> Any:
         if node.op in ENTIRE:
             return _entire(node.op, *args)
         if node.op in SPECIAL:
-            return sympy.Function(r"\varphi" + "'" * order_of(node.op))(*args)
+            return special(order_of(node.op), *args)
         return getattr(sympy, _TO_SYMPY.get(node.op, node.op))(*args)
 
     return fold([e], visit)[0]
@@ -128,6 +150,64 @@ def _entire(name: str, s: Any) -> Any:
     cos, sin, relative = sympy.cos(root), sympy.sin(root) / root, (sympy.exp(s) - 1) / s
     closed = {"cosroot": cos, "sinroot": sin, "sinroot1": (cos - sin) / (2 * s), "arcroot": (1 - sin) / s}
     return (closed | {"exprel": relative, "exprel1": (sympy.exp(s) - relative) / s})[name]
+
+
+@dataclass(frozen=True)
+class SympySystem:
+    """A `System` in sympy; `System.from_sympy` takes all of it back.
+
+    Symbols are real, those of parameters that are positive in the system positive. ``poisson`` is an immutable n×n
+    matrix, ``parameters`` maps symbols to their default values. ``casimirs`` are the declared ones and those found.
+    """
+
+    name: str
+    coordinates: tuple[Any, ...]
+    poisson: Any
+    hamiltonian: Any
+    parameters: Mapping[Any, Any]
+    casimirs: Mapping[str, Any]
+    invariants: Mapping[str, Any]
+
+
+def symbols_in_sympy(system: System) -> dict[str, Any]:
+    """The symbols of the coordinates and the parameters, by name."""
+    real = {c: sympy.Symbol(c, real=True) for c in system.coordinates}
+    given = {p.name: sympy.Symbol(p.name, **_assumed(p)) for p in system.parameters}
+    return real | given
+
+
+def _assumed(parameter: Parameter) -> dict[str, bool]:
+    return {"positive": True} if parameter.positive else {"real": True}
+
+
+def free_symbols(names: Iterable[str], taken: Iterable[str]) -> list[Any]:
+    """Real symbols of these names, with _ after those that are taken."""
+    used = {str(name) for name in taken}
+    result = []
+    for name in names:
+        while name in used:
+            name += "_"
+        used.add(name)
+        result.append(sympy.Symbol(name, real=True))
+    return result
+
+
+def given_back(system: System) -> SympySystem:
+    """See `System.to_sympy`."""
+    symbols = symbols_in_sympy(system)
+
+    def formula(e: Expression) -> Any:
+        return to_sympy(e, symbols)
+
+    return SympySystem(
+        system.name,
+        tuple(symbols[c] for c in system.coordinates),
+        sympy.ImmutableMatrix([[formula(e) for e in row] for row in system.poisson]),
+        formula(system.hamiltonian),
+        {symbols[p.name]: sympy.Rational(p.value.numerator, p.value.denominator) for p in system.parameters},
+        {name: formula(e) for name, e in system.casimirs.items()},
+        {name: formula(e) for name, e in system.invariants.items()},
+    )
 
 
 def system(

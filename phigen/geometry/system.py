@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from phigen.errors import Diagnostic, Location, SpecError
 from phigen.geometry.casimirs import found_casimirs
@@ -13,6 +13,9 @@ from phigen.geometry.lie_algebra import LieAlgebra
 from phigen.geometry.shapes import LiePoisson, Matrix, Shape
 from phigen.spec.model import Parameter, PoissonForm, Spec
 from phigen.symbolic.expression import Expression, gradient, total
+
+if TYPE_CHECKING:
+    from phigen.geometry.sympy_bridge import SympySystem
 
 
 @dataclass(frozen=True)
@@ -85,6 +88,12 @@ class System:
         from phigen.geometry.sympy_bridge import system as build
 
         return build(coordinates, poisson, hamiltonian, parameters, casimirs, invariants, name)
+
+    def to_sympy(self) -> SympySystem:
+        """Coordinates, π, H, parameters, Casimirs and invariants as sympy objects; see `SympySystem`."""
+        from phigen.geometry.sympy_bridge import given_back
+
+        return given_back(self)
 
 
 def system_from_spec(spec: Spec) -> System:

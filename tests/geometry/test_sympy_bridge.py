@@ -4,6 +4,7 @@ from fractions import Fraction
 
 import pytest
 import sympy
+from support import NAMES, described
 
 from phigen.errors import SpecError
 from phigen.geometry.shapes import LiePoisson
@@ -84,3 +85,37 @@ def test_unknown_and_doubled_symbols_are_errors():
 def test_matrix_of_the_wrong_size_is_an_error():
     with pytest.raises(SpecError, match="2×2, but there are 3 coordinates"):
         System.from_sympy([x, y, z], [[0, 1], [-1, 0]], x)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_systems_go_to_sympy_and_back(name):
+    system = described(name)[1]
+    there = system.to_sympy()
+    back = System.from_sympy(
+        there.coordinates,
+        there.poisson,
+        there.hamiltonian,
+        there.parameters,
+        casimirs=there.casimirs,
+        invariants=there.invariants,
+        name=there.name,
+    )
+    assert (back.name, back.coordinates, back.parameter_names) == (name, system.coordinates, system.parameter_names)
+    assert [(p.value, p.positive) for p in back.parameters] == [(p.value, p.positive) for p in system.parameters]
+    pairs = [(back.hamiltonian, system.hamiltonian)]
+    pairs += [(a, b) for rows in zip(back.poisson, system.poisson, strict=True) for a, b in zip(*rows, strict=True)]
+    for mine, theirs in ((back.casimirs, system.casimirs), (back.invariants, system.invariants)):
+        assert list(mine) == list(theirs)
+        pairs += [(mine[k], theirs[k]) for k in theirs]
+    assert decide_zero("round trip", [("", a - b) for a, b in pairs], system.positive).verdict == PROVED
+
+
+def test_symbols_in_sympy_carry_what_was_declared():
+    there = described("vortices3")[1].to_sympy()
+    assert all(c.is_real and c.is_positive is None for c in there.coordinates)
+    b = sympy.Symbol("b")
+    s = System.from_sympy([x, y], [[0, 1], [-1, 0]], x**2 * b + sympy.sqrt(a**2) * y, {a: 2, b: sympy.Rational(1, 3)})
+    there = s.to_sympy()
+    assert there.parameters == {a: 2, sympy.Symbol("b", real=True): sympy.Rational(1, 3)}
+    assert sympy.diff(there.hamiltonian, there.coordinates[1]) == a
+    assert there.poisson == sympy.Matrix([[0, 1], [-1, 0]])
