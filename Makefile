@@ -1,9 +1,9 @@
 # Two commands to start with:
 #
 #   make demo    compile a system, integrate it, print what was conserved
-#   make test    everything that must hold before a change is merged
+#   make test    everything that must hold before a change is merged; `make test-all` adds the long tests
 #
-# Both make their own environment in .venv, once. PYTHON=python3.12 chooses the interpreter.
+# They make their own environment in .venv, once. PYTHON=python3.12 chooses the interpreter.
 
 SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
@@ -14,7 +14,7 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.phigen-installed
 WORKERS ?= auto
 
-.PHONY: help demo test lint format golden figures bench clean
+.PHONY: help demo test test-all lint format golden figures bench clean
 
 help:
 	@sed -n '/^#/!q; s/^# \{0,1\}//p' Makefile
@@ -24,6 +24,10 @@ demo: $(STAMP)
 
 test: lint
 	$(BIN)/python -m pytest -n $(WORKERS)
+
+# With the long tests, and C compiled with the flags users get.
+test-all: lint
+	$(BIN)/python -m pytest -n $(WORKERS) --all
 
 lint: $(STAMP)
 	$(BIN)/ruff check .

@@ -1,11 +1,48 @@
 import pytest
+from tools import not_tested
+
+from phigen.runtime import toolchain
+
+
+def pytest_addoption(parser):
+    parser.addoption("--all", action="store_true", help="the long tests too, and C compiled with the flags users get")
+
+
+def pytest_configure(config):
+    if not toolchain.available():
+        raise pytest.UsageError("the tests need a C compiler; on Debian: apt-get install gcc libc6-dev")
+    config.addinivalue_line("markers", "slow: long; left out unless --all or -m is given, or the test is named by `::`")
+
+
+def pytest_collection_modifyitems(config, items):
+    named = any("::" in argument for argument in config.args)
+    if config.option.all or config.option.markexpr or named:
+        return
+    slow = [item for item in items if item.get_closest_marker("slow")]
+    config.hook.pytest_deselected(items=slow)
+    items[:] = [item for item in items if not item.get_closest_marker("slow")]
 
 
 @pytest.fixture(scope="session", autouse=True)
-def compiled_solvers(tmp_path_factory):
-    """Compiled C is shared by all tests and workers of one session, and not left in the cache of the user."""
+def compiled_solvers(request, tmp_path_factory):
+    """Compiled C is shared by all tests and workers of one session, and not left in the cache of the user.
+
+    Compilers take a quarter of the time with -Og. Tests of what -O3 makes of loops ask for it themselves; with --all
+    every test has it.
+    """
     base = tmp_path_factory.getbasetemp()
     shared = (base.parent if base.name.startswith("popen-") else base) / "solvers"
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("PHIGEN_CACHE_DIR", str(shared))
+        if not request.config.option.all:
+            flags = tuple("-Og" if flag == "-O3" else flag for flag in toolchain.BASE_FLAGS)
+            patch.setattr(toolchain, "BASE_FLAGS", flags)
         yield shared
+
+
+def pytest_terminal_summary(terminalreporter):
+    skipped = [report.longrepr[2] for report in terminalreporter.stats.get("skipped", [])]
+    if skipped:
+        terminalreporter.section("what was not tested")
+        for line in not_tested(skipped):
+            terminalreporter.write_line(line)

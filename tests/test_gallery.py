@@ -3,7 +3,6 @@
 import importlib.util
 import json
 import re
-import shutil
 from pathlib import Path
 
 import pytest
@@ -39,7 +38,6 @@ def test_page_shows_all_figures_and_they_are_small():
     assert [path for path in shown if (DOCS / path).stat().st_size >= 150_000] == []
 
 
-@pytest.mark.skipif(not shutil.which("cc"), reason="needs a C compiler")
 @pytest.mark.parametrize("name", QUICK)
 def test_numbers_are_current(name):
     today, before = gallery.facts(name), KNOWN[name]

@@ -2,7 +2,6 @@
 
 import json
 import math
-import shutil
 from functools import cache
 from pathlib import Path
 
@@ -12,14 +11,13 @@ from click.testing import CliRunner
 from walkthrough import follow, labels_of
 
 pytest.importorskip("matplotlib")
-pytestmark = pytest.mark.skipif(not shutil.which("cc"), reason="needs a C compiler")
 
-from phigen.analysis.drawing.palette import svg  # noqa: E402
-from phigen.analysis.paper import rigid_body  # noqa: E402
-from phigen.analysis.paper.plate import Plate  # noqa: E402
-from phigen.analysis.paper.plates import PLATES  # noqa: E402
-from phigen.cli import group  # noqa: E402
-from phigen.cli.reproduce import described, lines_of  # noqa: E402
+from phigen.analysis.drawing.palette import svg
+from phigen.analysis.paper import rigid_body
+from phigen.analysis.paper.plate import Plate
+from phigen.analysis.paper.plates import PLATES
+from phigen.cli import group
+from phigen.cli.reproduce import described, lines_of
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 STORED = {entry["figure"]: entry for entry in json.loads((DOCS / "figures" / "paper.json").read_text())}

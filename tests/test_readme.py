@@ -2,7 +2,6 @@
 
 import os
 import re
-import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -46,7 +45,6 @@ def workshop(tmp_path):
     return run
 
 
-@pytest.mark.skipif(not shutil.which("cc"), reason="needs a C compiler")
 def test_c_example_prints_what_the_readme_says(workshop):
     commands = block("The commands").strip().splitlines()
     assert commands[-1] == "./main"

@@ -1,6 +1,5 @@
 """docs/tutorial.md followed to the letter; its figure is the one that its command draws."""
 
-import shutil
 from pathlib import Path
 
 import pytest
@@ -11,7 +10,6 @@ pytest.importorskip("matplotlib")
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 
 
-@pytest.mark.skipif(not shutil.which("cc"), reason="needs a C compiler")
 def test_tutorial_can_be_followed(tmp_path):
     assert follow(DOCS / "tutorial.md", tmp_path) == 15
     committed, drawn = DOCS / "figures" / "tutorial.svg", tmp_path / "rattleback.svg"

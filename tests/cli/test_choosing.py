@@ -2,7 +2,6 @@
 
 import re
 import shlex
-import shutil
 from functools import cache
 
 import numpy as np
@@ -17,8 +16,6 @@ from phigen.analysis.tuning.trials import energy_measure
 
 DOCS = resources.bundled_specs().parent / "docs"
 TEXT = (DOCS / "choosing.md").read_text(encoding="utf-8")
-
-pytestmark = pytest.mark.skipif(not shutil.which("cc"), reason="runs compiled C")
 
 
 def rows(heading):

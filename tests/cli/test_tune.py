@@ -2,7 +2,6 @@
 
 import json
 import re
-import shutil
 from pathlib import Path
 
 import pytest
@@ -10,8 +9,6 @@ import pytest
 from phigen import resources
 
 SPECS = resources.bundled_specs()
-
-pytestmark = pytest.mark.skipif(not shutil.which("cc"), reason="times compiled C")
 
 
 def paste(source, found):

@@ -10,8 +10,6 @@ import pytest
 from phigen.errors import ToolchainError
 from phigen.runtime import cache, toolchain
 
-pytestmark = pytest.mark.skipif(not toolchain.available(), reason="no C compiler")
-
 FILES = {"one.c": '#include "one.h"\nint one(void) { return ONE; }\n', "one.h": "#define ONE 1\n"}
 
 

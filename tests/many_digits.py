@@ -1,0 +1,236 @@
+"""The scheme in many digits, without anything of phigen.scheme and phigen.targets: an independent one-step map."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from fractions import Fraction
+from typing import Any
+
+import mpmath
+
+from phigen.compiler import Compilation
+from phigen.series.hamilton_jacobi import graph_series
+from phigen.symbolic.expression import Expression, derivatives, fold, gradient, number, total
+
+DIGITS = 50
+
+
+def precisely(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Run with `DIGITS` digits of mpmath."""
+
+    def wrapped(*args: Any, **kwargs: Any) -> Any:
+        with mpmath.workdps(DIGITS):
+            return function(*args, **kwargs)
+
+    wrapped.__name__, wrapped.__doc__ = function.__name__, function.__doc__
+    return wrapped
+
+
+def values(roots: Sequence[Expression], at: Mapping[str, Any]) -> list[Any]:
+    """Values of expressions as mpmath numbers of the current precision, by rules of its own."""
+    return fold(roots, lambda e, args: _value(e, args, at))
+
+
+def _value(e: Expression, args: list[Any], at: Mapping[str, Any]) -> Any:
+    match e.op:
+        case "number":
+            return mpmath.mpf(e.value.numerator) / e.value.denominator
+        case "symbol":
+            return mpmath.mpf(at[e.value])
+        case "pi":
+            return +mpmath.pi
+        case "E":
+            return +mpmath.e
+        case "add":
+            return args[0] + args[1]
+        case "sub":
+            return args[0] - args[1]
+        case "neg":
+            return -args[0]
+        case "mul":
+            return args[0] * args[1]
+        case "pow":
+            if e.value.denominator == 1:
+                return args[0] ** int(e.value)
+            return mpmath.power(args[0], mpmath.mpf(e.value.numerator) / e.value.denominator)
+        case "power":
+            return mpmath.power(*args)
+        case "abs":
+            return abs(args[0])
+        case "sign":
+            return mpmath.sign(args[0])
+        case "versin":
+            return 1 - mpmath.cos(args[0])
+        case "inv":
+            return 1 / args[0] if args[0] > 0 else mpmath.nan
+        case "phi0" | "phi1" | "phi2":
+            return _phi(int(e.op[3:]), args[0])
+        case "cosroot" | "sinroot" | "sinroot1" | "arcroot" | "exprel" | "exprel1":
+            return _entire(e.op, args[0])
+    return getattr(mpmath, e.op)(*args)
+
+
+def _entire(name: str, s: Any) -> Any:
+    """cos √s, sin(√s)/√s, (e^s − 1)/s or a derivative, by complex arithmetic: one formula for s of either sign."""
+
+    def closed(z: Any) -> Any:
+        root = mpmath.sqrt(z)
+        if name.startswith("exprel"):
+            return (mpmath.exp(z) - 1) / z
+        if name == "arcroot":
+            return (root - mpmath.sin(root)) / root**3
+        return mpmath.cos(root) if name == "cosroot" else mpmath.sin(root) / root
+
+    return mpmath.re(mpmath.diff(closed, mpmath.mpc(s)) if name.endswith("1") else closed(mpmath.mpc(s)))
+
+
+def _phi(order: int, s: Any) -> Any:
+    """φ(s) = (1 − w cot w)/s, w = √s/2, or a derivative: from its Taylor coefficients 2ζ(2n+2)/(4π²)^(n+1) near 0."""
+    if abs(s) > 12:
+
+        def closed(u: Any) -> Any:
+            w = mpmath.sqrt(u) / 2
+            return (1 - w * mpmath.cot(w)) / u
+
+        with mpmath.extradps(20):
+            return mpmath.re(mpmath.diff(closed, mpmath.mpc(s), order))
+    result, n = mpmath.mpf(0), 0
+    while True:
+        power = n + order + 1
+        term = 2 * mpmath.zeta(2 * power) / (4 * mpmath.pi**2) ** power * mpmath.rf(n + 1, order) * s**n
+        result, n = result + term, n + 1
+        if abs(term) <= mpmath.eps * abs(result):
+            return result
+
+
+class PreciseStep:
+    """The one-step map in many digits: ``step(x)``, and ``defect(x)``, how far it is from a Poisson map at x.
+
+    Made from the bi-realisation and the graph series alone, by Newton's method on α(y, ∇S_h(y)) = x and
+    x' = β(y, ∇S_h(y)); the tangent map comes from implicit differentiation. For paths see precise_path.py.
+    """
+
+    def __init__(self, compilation: Compilation, parameters: Mapping[str, float], h: float) -> None:
+        self.n, self._poisson = compilation.system.dimension, [e for row in compilation.system.poisson for e in row]
+        self.coordinates, self._parameters = compilation.system.coordinates, dict(parameters)
+        fractions = compilation.program.fractions
+        self._stages = [_Stage(compilation, parameters, Fraction(f) * Fraction(h)) for f in fractions]
+
+    @precisely
+    def __call__(self, x: Sequence[Any]) -> list[Any]:
+        """Φ(x)."""
+        for stage in self._stages:
+            x = stage.solve(x)
+        return list(x)
+
+    def poisson(self, x: Sequence[Any]) -> Any:
+        """The matrix π(x)."""
+        at = {**self._parameters, **dict(zip(self.coordinates, x, strict=True))}
+        return _columns(values(self._poisson, at), self.n, self.n).T
+
+    @precisely
+    def tangent(self, x: Sequence[Any]) -> tuple[list[Any], Any]:
+        """Φ(x) and DΦ(x)."""
+        product = mpmath.eye(self.n)
+        for stage in self._stages:
+            x, tangent = stage.solve_with_tangent(x)
+            product = tangent * product
+        return list(x), product
+
+    @precisely
+    def defect(self, x: Sequence[Any]) -> float:
+        """|DΦ π DΦᵀ − π∘Φ| relative to |π∘Φ| at x."""
+        image, tangent = self.tangent(x)
+        return relative_defect(tangent, self.poisson(x), self.poisson(image))
+
+
+class _Stage:
+    def __init__(self, compilation: Compilation, parameters: Mapping[str, float], h: Fraction) -> None:
+        realisation, self.coordinates = compilation.realisation, compilation.system.coordinates
+        self.n, self._parameters = len(self.coordinates), dict(parameters)
+        slope = _slope(compilation, h)
+        hessian = [d for c in self.coordinates for d in derivatives(slope, c)]  # column by column
+        self._momenta = [*slope, *hessian]
+        both = [*realisation.alpha, *realisation.beta]
+        names = [*self.coordinates, *realisation.covector]
+        self._maps = [*both, *(d for name in names for d in derivatives(both, name))]
+        self._covector = realisation.covector
+
+    def _linearised(self, y: Sequence[Any]) -> tuple[Any, Any, Any, Any]:
+        n, at = self.n, {**self._parameters, **dict(zip(self.coordinates, y, strict=True))}
+        momenta = values(self._momenta, at)
+        hessian = _columns(momenta[n:], n, n)
+        maps = values(self._maps, {**at, **dict(zip(self._covector, momenta[:n], strict=True))})
+        by_x, by_p = _columns(maps[2 * n :][: 2 * n * n], 2 * n, n), _columns(maps[2 * n :][2 * n * n :], 2 * n, n)
+        total_derivative = by_x + by_p * hessian
+        alpha, beta = mpmath.matrix(maps[:n]), mpmath.matrix(maps[n : 2 * n])
+        return alpha, beta, total_derivative[:n, :], total_derivative[n:, :]
+
+    def _solved(self, x: Sequence[Any]) -> tuple[Any, Any, Any]:
+        """β, Dα and Dβ, the derivatives along y, where α = x."""
+        y, x = mpmath.matrix(list(x)), mpmath.matrix(list(x))
+        for _ in range(60):
+            alpha, beta, d_alpha, d_beta = self._linearised(list(y))
+            delta = mpmath.lu_solve(d_alpha, alpha - x)
+            if mpmath.norm(delta, mpmath.inf) <= mpmath.norm(y, mpmath.inf) * mpmath.mpf(10) ** (4 - DIGITS):
+                return beta, d_alpha, d_beta
+            y -= delta
+        raise ArithmeticError("no convergence")
+
+    def solve(self, x: Sequence[Any]) -> list[Any]:
+        return list(self._solved(x)[0])
+
+    def solve_with_tangent(self, x: Sequence[Any]) -> tuple[list[Any], Any]:
+        beta, d_alpha, d_beta = self._solved(x)
+        return list(beta), d_beta * mpmath.inverse(d_alpha)
+
+
+def _slope(compilation: Compilation, h: Fraction) -> list[Expression]:
+    """∇S_h as a graph, with h a number."""
+    # A composition is made of steps of order 2.
+    system, terms = compilation.system, compilation.order.terms if len(compilation.program.fractions) == 1 else 1
+    realisation = compilation.realisation
+    series = graph_series(
+        system.hamiltonian, realisation.alpha, system.coordinates, terms, symmetric=realisation.symmetric
+    )
+    return gradient(total(number(h) ** (i + 1) * s for i, s in enumerate(series)), system.coordinates)
+
+
+def _columns(entries: Sequence[Any], rows: int, columns: int) -> Any:
+    matrix = mpmath.matrix(rows, columns)
+    for k, e in enumerate(entries):
+        matrix[k % rows, k // rows] = e
+    return matrix
+
+
+def relative_defect(tangent: Any, before: Any, after: Any) -> float:
+    """|T π(x) Tᵀ − π(x')| relative to |π(x')|."""
+    return float(_largest(tangent * before * tangent.T - after) / _largest(after))
+
+
+def _largest(matrix: Any) -> Any:
+    return max(abs(e) for e in matrix)
+
+
+@precisely
+def tangent_by_differences(step: Callable[[Sequence[Any]], Sequence[Any]], x: Sequence[Any]) -> Any:
+    """The derivative of a map given in many digits, by central differences: good to a third of the digits or more."""
+    n, width = len(x), mpmath.mpf(10) ** (-DIGITS // 3)
+    tangent = mpmath.matrix(n, n)
+    for j in range(n):
+        ends = []
+        for sign in (1, -1):
+            moved = [mpmath.mpf(v) for v in x]
+            moved[j] += sign * width
+            ends.append(step(moved))
+        for i in range(n):
+            tangent[i, j] = (ends[0][i] - ends[1][i]) / (2 * width)
+    return tangent
+
+
+@precisely
+def defect_of_map(
+    step: Callable[[Sequence[Any]], Sequence[Any]], poisson: Callable[[Sequence[Any]], Any], x: Sequence[Any]
+) -> float:
+    """|DΦ π DΦᵀ − π∘Φ| relative to |π∘Φ| of any map, by differences in many digits."""
+    return relative_defect(tangent_by_differences(step, x), poisson(x), poisson(step(x)))

@@ -1,0 +1,109 @@
+"""Solvers of compilations, each made once; and the struct of the C solver, looked at from outside."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import mpmath
+import numpy as np
+from many_digits import precisely
+
+from phigen.compiler import Compilation, emit
+from phigen.runtime import cache as library_cache
+from phigen.runtime.c_solver import CSolver
+from phigen.runtime.interface import Interface
+from phigen.runtime.numpy_solver import NumpySolver
+from phigen.runtime.solver import Solver
+
+TARGETS = ("c", "numpy")
+
+COMMAND = "phigen build"
+
+_made: dict[tuple[Any, ...], tuple[Compilation, Any]] = {}
+
+
+def _once(compilation: Compilation, key: str, make: Callable[[], Any]) -> Any:
+    """What was made of a compilation before, which is kept alive with it; compilations cannot be hashed."""
+    place = (key, id(compilation))
+    if place not in _made:
+        _made[place] = compilation, make()
+    return _made[place][1]
+
+
+def files(compilation: Compilation, target: str) -> Mapping[str, str]:
+    """The generated files."""
+    return _once(compilation, f"files {target}", lambda: emit(compilation.program, target, COMMAND))
+
+
+def interface(compilation: Compilation) -> Interface:
+    """The names that the runtime needs."""
+    program = compilation.program
+    return Interface(
+        program.name,
+        program.coordinates,
+        program.order,
+        {p.name: float(p.value) for p in program.parameters},
+        frozenset(p.name for p in program.parameters if p.positive),
+        program.casimirs,
+    )
+
+
+def solver(compilation: Compilation, target: str) -> Solver:
+    """A solver of one target; compiled C comes from the cache."""
+    return _once(compilation, f"solver {target}", lambda: _solver(compilation, target))
+
+
+def _solver(compilation: Compilation, target: str) -> Solver:
+    names = interface(compilation)
+    if target == "c":
+        return Solver(CSolver.compile(files(compilation, "c"), names), names)
+    return Solver(NumpySolver.from_source(files(compilation, "numpy")[f"{names.name}.py"], names), names)
+
+
+class RawC:
+    """A generated C library called as a C program would, with a view of ``x`` and ``carry`` in the solver's struct."""
+
+    def __init__(self, compilation: Compilation) -> None:
+        self.name, self.n = compilation.program.name, compilation.program.dimension
+        self._library = library_cache.load(files(compilation, "c"))
+        self._parameters = [p.name for p in compilation.program.parameters]
+        self.memory = np.zeros(self.call("solver_size", ctypes.c_size_t), dtype=np.uint8)
+        doubles = self.memory[: 16 * self.n].view(np.float64)
+        self.x, self.carry = doubles[: self.n], doubles[self.n :]
+        counters = self.memory[16 * self.n :][: 2 * ctypes.sizeof(ctypes.c_size_t)].view(np.uintp)
+        self.counters = counters  # steps, evaluations
+
+    def call(self, function: str, result: Any, *args: Any) -> Any:
+        """Call ``NAME_function`` with arguments that are ctypes objects already."""
+        f = getattr(self._library, f"{self.name}_{function}")
+        f.restype = result
+        return f(*args)
+
+    @property
+    def here(self) -> ctypes.c_void_p:
+        """The address of the struct."""
+        return ctypes.c_void_p(self.memory.ctypes.data)
+
+    def init(self, x0: Sequence[float], parameters: Mapping[str, float] | None = None) -> int:
+        """``NAME_init``; parameters None passes a null pointer."""
+        start = np.array(x0, dtype=float)
+        packed = None
+        if parameters is not None:
+            array = np.array([parameters[p] for p in self._parameters] or [0.0])
+            packed = ctypes.c_void_p(array.ctypes.data)
+        return self.call("init", ctypes.c_int, self.here, packed, ctypes.c_void_p(start.ctypes.data))
+
+    def step(self, h: float) -> int:
+        """``NAME_step``."""
+        return self.call("step", ctypes.c_int, self.here, ctypes.c_double(h))
+
+    def integrate(self, h: float, steps: int) -> int:
+        """``NAME_integrate``."""
+        return self.call("integrate", ctypes.c_int, self.here, ctypes.c_double(h), ctypes.c_size_t(steps))
+
+    @precisely
+    def exact_state(self) -> list[Any]:
+        """x + carry, in many digits."""
+        return [mpmath.mpf(float(x)) + mpmath.mpf(float(c)) for x, c in zip(self.x, self.carry, strict=True)]

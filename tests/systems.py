@@ -1,0 +1,107 @@
+"""Systems that tests share: those of the corpus and their runs, and some written in a few lines."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from functools import cache
+from typing import Any
+
+from phigen import resources, spec
+from phigen.compiler import Compilation, compile_spec
+from phigen.geometry.system import System, system_from_spec
+from phigen.realisations.catalogue import realise
+from phigen.realisations.protocol import BiRealisation
+from phigen.scheme.discretisation import hamilton_jacobi
+from phigen.spec.model import Run
+from phigen.symbolic.expression import Expression, symbol
+from phigen.symbolic.numeric import evaluate_with_scale
+from phigen.symbolic.symbols import momentum
+
+#: The corpus.
+NAMES = sorted(path.stem for path in resources.bundled_specs().glob("*.yaml"))
+
+#: Every run of the corpus, as pairs of names.
+RUNS = [(name, run) for name in NAMES for run in spec.load(resources.bundled_specs() / f"{name}.yaml").runs]
+
+BODY = """coordinates: [x1, x2, x3]
+poisson: {brackets: {x1: {x2: -x3, x3: x2}, x2: {x3: -x1}}}
+hamiltonian: x1**2/2 + x2**2/4 + x3**2/6
+"""
+
+SPECIES = """coordinates: [x1, x2, x3]
+poisson: {log_canonical: [[0, 1, 1], [-1, 0, 1], [-1, -1, 0]]}
+hamiltonian: x1 + x2 + x3
+"""
+
+
+def plain(given: spec.Spec) -> spec.Spec:
+    """The spec with no gauge where it leaves that to phigen: tests/generated/test_gauge.py is about gauges."""
+    return replace(given, gauge="none") if given.gauge == "auto" else given
+
+
+def compile_text(text: str, order: int | None = None, scheme: str | None = None, **more: Any) -> Compilation:
+    """The compilation of a spec given as YAML without its first two keys."""
+    return compile_spec(plain(spec.loads(f"phigen: 1\nname: t\n{text}")), order=order, scheme=scheme, **more)
+
+
+@cache
+def compiled(name: str, order: int | None = None, scheme: str | None = None) -> Compilation:
+    """The compilation of a system of the corpus."""
+    found = plain(spec.load(resources.bundled_specs() / f"{name}.yaml"))
+    return compile_spec(found, order=order, scheme=scheme)
+
+
+@cache
+def described(name: str) -> tuple[spec.Spec, System, BiRealisation]:
+    """What is known of a system of the corpus before anything of its solver is made: quick, for choosing tests."""
+    found = spec.load(resources.bundled_specs() / f"{name}.yaml")
+    system = system_from_spec(found)
+    return found, system, realise(system, found.birealisation)
+
+
+def first_run(compilation: Compilation) -> Run:
+    """The first run of a spec."""
+    return next(iter(compilation.spec.runs.values()))
+
+
+@dataclass(frozen=True)
+class Setting:
+    """The numbers of a run: state, step size, parameters (all of them)."""
+
+    x: tuple[float, ...]
+    h: float
+    parameters: Mapping[str, float]
+
+
+def setting(compilation: Compilation, name: str | None = None) -> Setting:
+    """The numbers of a run of the spec, the first unless another is named."""
+    run = compilation.spec.runs[name] if name else first_run(compilation)
+    defaults = {p.name: float(p.value) for p in compilation.spec.parameters}
+    return Setting(
+        tuple(float(v) for v in run.initial),
+        float(run.step),
+        {**defaults, **{k: float(v) for k, v in run.parameters.items()}},
+    )
+
+
+def casimir_scales(compilation: Compilation, at: Setting) -> list[float]:
+    """The size of each Casimir at a state: the largest term that occurs in it, at least its value."""
+    values = _fractions(compilation.spec.coordinates, at)
+    pairs = evaluate_with_scale(list(compilation.system.casimirs.values()), values, 30)
+    return [max(abs(float(value)), 1e-300) for value, _ in pairs]
+
+
+def _fractions(coordinates: Sequence[str], at: Setting) -> dict[str, Fraction]:
+    return {k: Fraction(v) for k, v in [*zip(coordinates, at.x, strict=True), *at.parameters.items()]}
+
+
+def series_of(system, realisation, terms, static=()):
+    """S_1 … S_terms of a system in a tower."""
+    return hamilton_jacobi(system, realisation, terms, static).polynomial(terms)
+
+
+def symbols(names: str) -> list[Expression]:
+    """Symbols from names separated by spaces; ``p:x`` is the momentum of x."""
+    return [symbol(momentum(n[2:]) if n.startswith("p:") else n) for n in names.split()]
