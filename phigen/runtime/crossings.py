@@ -18,6 +18,7 @@ import numpy as np
 from phigen.runtime.interface import BackendError, Floats
 from phigen.runtime.session import Course
 from phigen.runtime.tables import Column, write
+from phigen.runtime.trajectory import trajectory_columns
 
 C = TypeVar("C", bound=Course)
 
@@ -56,7 +57,7 @@ class Section:
 
 def section_columns(coordinates: tuple[str, ...]) -> list[Column]:
     """The columns of a table of crossings."""
-    return [Column("t", ("t",), flat=True), Column("x", coordinates)]
+    return trajectory_columns(coordinates, ())[:2]
 
 
 @dataclass

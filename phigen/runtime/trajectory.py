@@ -11,6 +11,8 @@ import numpy as np
 
 from phigen.runtime.interface import Floats
 from phigen.runtime.tables import Column, write
+from phigen.targets.names import identifiers
+from phigen.targets.reserved import Reserved
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +64,9 @@ class Trajectory:
 
 
 def trajectory_columns(coordinates: tuple[str, ...], casimirs: tuple[str, ...]) -> list[Column]:
-    """The columns of a table of states."""
-    first = [Column("t", ("t",), flat=True), Column("x", coordinates), Column("energy", ("energy",), flat=True)]
-    return [*first, *(Column(f"casimir_{name}", (name,), flat=True) for name in casimirs)]
+    """The columns of a table of states; no two have one name, so a coordinate ``t`` is in the column ``t_``."""
+    own = Reserved(frozenset(["t", "energy"]))
+    named = tuple(identifiers(coordinates, own).values())
+    first = [Column("t", ("t",), flat=True), Column("x", named), Column("energy", ("energy",), flat=True)]
+    given = identifiers(casimirs, own | named)
+    return [*first, *(Column(f"casimir_{name}", (given[name],), flat=True) for name in casimirs)]

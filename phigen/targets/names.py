@@ -14,13 +14,13 @@ from phigen.targets.reserved import Reserved
 
 
 def identifiers(names: Iterable[str], reserved: Reserved) -> dict[str, str]:
-    """Distinct identifiers for names; whichever of them can stand is its own identifier."""
+    """Distinct identifiers for names, in their order; whichever of them can stand is its own identifier."""
     names = list(names)
     given = {name: name for name in names if name not in reserved}
     for name in names:
         if name not in given:
             given[name] = _free(name, reserved, set(given.values()))
-    return given
+    return {name: given[name] for name in names}
 
 
 def _free(wanted: str, reserved: Reserved, taken: Iterable[str]) -> str:

@@ -3,7 +3,7 @@ import csv
 import numpy as np
 import pytest
 
-from phigen.runtime.trajectory import Trajectory
+from phigen.runtime.trajectory import Trajectory, trajectory_columns
 
 
 @pytest.fixture
@@ -43,3 +43,9 @@ def test_columns_are_found_by_name(trajectory):
     assert trajectory.column("p").tolist() == trajectory.x[:, 1].tolist()
     with pytest.raises(KeyError, match="q, p"):
         trajectory.column("z")
+
+
+def test_no_two_columns_have_one_name():
+    columns = trajectory_columns(("t", "x", "energy", "t_"), ("C", "x"))
+    assert [name for c in columns for name in c.names] == ["t", "t__", "x", "energy_", "t_", "energy", "C", "x_"]
+    assert [c.key for c in columns] == ["t", "x", "energy", "casimir_C", "casimir_x"]

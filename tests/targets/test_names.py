@@ -206,7 +206,7 @@ def test_names_that_can_stand_stand_and_others_change_as_documented():
     names = ["int", "int_", "k", "_X", "v_X", "M_1", "M_E", "SIGMA", "E1", "gamma"]
     given = identifiers(names, C_RESERVED)
     changed = {"int": "int__", "_X": "v_X_", "M_E": "M_E_"}
-    assert given == {n: changed.get(n, n) for n in names}
+    assert list(given.items()) == [(n, changed.get(n, n)) for n in names]
 
 
 def test_scope_gives_distinct_identifiers_that_are_not_reserved():
