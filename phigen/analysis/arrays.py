@@ -3,19 +3,42 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from phigen.symbolic.expression import Expression, fold
+from phigen.symbolic.arithmetic import Arithmetic
+from phigen.symbolic.expression import Expression
+from phigen.symbolic.functions import FUNCTIONS
 
 Floats = NDArray[np.float64]
 
-_NAMES = {
-    "asin": "arcsin", "acos": "arccos", "atan": "arctan", "atan2": "arctan2",
-    "asinh": "arcsinh", "acosh": "arccosh", "atanh": "arctanh",
-}  # fmt: skip
+
+class Arrays(Arithmetic[Any]):
+    """Arrays of doubles, with the functions of NumPy."""
+
+    def __init__(self, values: Mapping[str, Any]) -> None:
+        self._values = values
+
+    def constant(self, value: Fraction) -> Any:
+        """The nearest double."""
+        return float(value)
+
+    def variable(self, name: str) -> Any:
+        """The array given for a symbol."""
+        return self._values[name]
+
+    def power(self, base: Any, exponent: Fraction) -> Any:
+        """An array to a rational power."""
+        return np.power(base, float(exponent))
+
+    def function(self, name: str, args: list[Any]) -> Any:
+        """A function that NumPy has."""
+        if not args:
+            return np.pi if name == "pi" else np.e
+        return getattr(np, FUNCTIONS[name].written["numpy"].removeprefix("np."))(*args)
 
 
 def evaluate(roots: Sequence[Expression], values: Mapping[str, Any]) -> list[Floats]:
@@ -23,28 +46,5 @@ def evaluate(roots: Sequence[Expression], values: Mapping[str, Any]) -> list[Flo
 
     Raises `KeyError` for a symbol without value.
     """
-
-    def visit(node: Expression, args: list[Any]) -> Any:
-        match node.op:
-            case "number":
-                return float(node.value)
-            case "symbol":
-                return values[node.value]
-            case "pi" | "E":
-                return np.pi if node.op == "pi" else np.e
-            case "add":
-                return args[0] + args[1]
-            case "sub":
-                return args[0] - args[1]
-            case "neg":
-                return -args[0]
-            case "mul":
-                return args[0] * args[1]
-            case "pow":
-                return np.power(args[0], float(node.value))
-            case "power":
-                return np.power(args[0], args[1])
-        return getattr(np, _NAMES.get(node.op, node.op))(*args)
-
     with np.errstate(all="ignore"):
-        return [np.asarray(v, dtype=np.float64) for v in fold(roots, visit)]
+        return [np.asarray(v, dtype=np.float64) for v in Arrays(values).values(roots)]

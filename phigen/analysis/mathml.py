@@ -15,8 +15,8 @@ from html import escape
 from itertools import pairwise
 from typing import Any
 
-from phigen.symbolic.entire import ENTIRE
-from phigen.symbolic.expression import Expression, fold, natural_key
+from phigen.symbolic.expression import Expression, familiar, fold, natural_key
+from phigen.symbolic.functions import FUNCTIONS
 from phigen.symbolic.readable import Formula
 from phigen.symbolic.symbols import GAUGE, PART, Symbol
 
@@ -34,10 +34,6 @@ _GREEK = {
     "iota": "ι", "kappa": "κ", "lambda": "λ", "mu": "μ", "nu": "ν", "xi": "ξ", "rho": "ρ", "sigma": "σ", "tau": "τ",
     "upsilon": "υ", "phi": "φ", "chi": "χ", "psi": "ψ", "omega": "ω", "Gamma": "Γ", "Delta": "Δ", "Theta": "Θ",
     "Lambda": "Λ", "Xi": "Ξ", "Pi": "Π", "Sigma": "Σ", "Phi": "Φ", "Psi": "Ψ", "Omega": "Ω",
-}  # fmt: skip
-_FUNCTIONS = {
-    "asin": "arcsin", "acos": "arccos", "atan": "arctan", "asinh": "arsinh", "acosh": "arcosh", "atanh": "artanh",
-    "sign": "sgn", "phi0": "φ", "phi1": "φ′", "phi2": "φ″",
 }  # fmt: skip
 #: Symbols of phigen's own, ``p:x1`` and the like: the letter before the index.
 _OWN = {GAUGE: "λ", PART: "σ"}
@@ -105,7 +101,7 @@ Sum = tuple[Term, ...]
 
 def terms_of(e: Expression) -> Sum:
     """The expression as a sum of terms; empty if it is 0."""
-    return fold([e], _visit)[0]
+    return fold(familiar([e]), _visit)[0]
 
 
 def terms_of_formula(formula: Formula) -> Sum:
@@ -217,44 +213,14 @@ def _visit(node: Expression, args: list[Sum]) -> Sum:
             return _one(_base(args[0]).power(summed(args[1])))
         case "exp" if len(summed(args[0])) <= _LONG_EXPONENT:
             return _one(Factor("<mi>e</mi>").power(summed(args[0])))
-        case "expm1":
-            return (*_called("exp", args), Term(Fraction(-1)))
-        case "versin":
-            return (Term(Fraction(1)), *_negated(_called("cos", args)))
-        case "log1p":
-            return _called("log", [_sorted((Term(Fraction(1)), *args[0]))])
-        case "inv":
-            return _power(args[0], Fraction(-1))
-        case op if op in ENTIRE:
-            return _entire(op, args[0])
         case "abs":
             return _one(Factor(_row(f"<mo>|</mo>{summed(args[0])}<mo>|</mo>")))
     return _called(node.op, args)
 
 
-def _entire(name: str, s: Sum) -> Sum:
-    """A function of `ENTIRE`, as its closed form for s > 0."""
-    root, inverse = _power(s, Fraction(1, 2)), _power(s, Fraction(-1))
-    cos, sin = _called("cos", [root]), _times(_called("sin", [root]), _power(s, Fraction(-1, 2)))
-    exp = _one(Factor("<mi>e</mi>").power(summed(s)))
-    relative = _times((*exp, Term(Fraction(-1))), inverse)
-    match name:
-        case "cosroot":
-            return cos
-        case "sinroot":
-            return sin
-        case "sinroot1":
-            return _times((Term(Fraction(1, 2)),), cos + _negated(sin), inverse)
-        case "arcroot":
-            return _times((Term(Fraction(1)), *_negated(sin)), _power(s, Fraction(-1)))
-        case "exprel":
-            return relative
-    return _times(exp + _negated(relative), inverse)
-
-
 def _called(function: str, args: Sequence[Sum]) -> Sum:
     arguments = _parentheses("<mo>,</mo>".join(summed(a) for a in args))
-    return _one(Factor(f"<mi>{escape(_FUNCTIONS.get(function, function))}</mi>", tail=_APPLY + arguments))
+    return _one(Factor(f"<mi>{escape(FUNCTIONS[function].letters or function)}</mi>", tail=_APPLY + arguments))
 
 
 def _power(base: Sum, exponent: Fraction) -> Sum:

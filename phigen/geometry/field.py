@@ -8,7 +8,8 @@ from typing import Any
 
 from flint import Ordering, fmpq, fmpq_mpoly_ctx
 
-from phigen.symbolic.expression import Expression, fold, number, topological
+from phigen.symbolic.arithmetic import Arithmetic
+from phigen.symbolic.expression import Expression, number, topological
 from phigen.symbolic.horner import horner
 from phigen.symbolic.tower import rational
 
@@ -64,7 +65,7 @@ class Ratio:
     __hash__ = None  # type: ignore[assignment]
 
 
-class Field:
+class Field(Arithmetic[Scalar]):
     """The smallest field Q(symbols) that holds the given expressions.
 
     A function of parameters (``sqrt(l)``, ``pi``) is one more independent symbol: relations between such
@@ -95,25 +96,31 @@ class Field:
         """The expression as an element; KeyError if it needs a symbol that the field does not have."""
         if e.is_number:
             return self.number(e.value)
-        return fold([e], self._visit)[0]
+        return self.values([e])[0]
 
-    def _visit(self, node: Expression, args: list[Scalar]) -> Scalar:
+    def visit(self, node: Expression, args: list[Scalar]) -> Scalar:
+        """The element of a node."""
         if id(node) in self._index:
             return Ratio(self._context.gens()[self._index[id(node)]], self._context.constant(1))
-        match node.op:
-            case "number":
-                return self.number(node.value)
-            case "add":
-                return args[0] + args[1]
-            case "sub":
-                return args[0] - args[1]
-            case "neg":
-                return -args[0]
-            case "mul":
-                return args[0] * args[1]
-            case "pow" if _integer_power(node):
-                return args[0] ** int(node.value)
-        raise KeyError(str(node))
+        return super().visit(node, args)
+
+    def constant(self, value: Fraction) -> Scalar:
+        """The rational number as an element."""
+        return self.number(value)
+
+    def variable(self, name: str) -> Scalar:
+        """KeyError: the symbols that the field has are atoms."""
+        raise KeyError(name)
+
+    def power(self, base: Scalar, exponent: Fraction) -> Scalar:
+        """An integer power."""
+        if exponent.denominator != 1:
+            raise KeyError(str(exponent))
+        return base ** int(exponent)
+
+    def function(self, name: str, args: list[Scalar]) -> Scalar:
+        """KeyError: the functions that the field has are atoms."""
+        raise KeyError(name)
 
     def expression(self, element: Scalar) -> Expression:
         """The element as an expression."""

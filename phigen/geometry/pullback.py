@@ -22,11 +22,9 @@ from phigen.symbolic.expression import (
     topological,
     total,
 )
+from phigen.symbolic.functions import FUNCTIONS
 from phigen.symbolic.tower import Tower
 from phigen.symbolic.verdict import decide_zero
-
-#: Functions with an inverse on the whole domain, and it.
-_INVERSES = {"exp": "log", "log": "exp", "sinh": "asinh", "asinh": "sinh", "atan": "tan", "tanh": "atanh"}
 
 
 @dataclass(frozen=True)
@@ -152,8 +150,8 @@ def _solved(e: Expression, value: Expression, x: str) -> Expression | None:
             return _solved(argument, value / others[0], x)
         case "pow" if e.value == -1 or (e.value.numerator == 1 and e.value > 0):
             return _solved(argument, power(value, 1 / Fraction(e.value)), x)
-        case op if op in _INVERSES:
-            return _solved(argument, call(_INVERSES[op], value), x)
+        case op if op in FUNCTIONS and (inverse := FUNCTIONS[op].inverse):
+            return _solved(argument, call(inverse, value), x)
     return None
 
 

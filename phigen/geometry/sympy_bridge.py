@@ -15,15 +15,13 @@ import sympy
 from phigen.errors import Diagnostic, SpecError
 from phigen.geometry.system import System, build_system
 from phigen.spec.model import MatrixForm, Parameter
-from phigen.symbolic.entire import ENTIRE
+from phigen.symbolic.arithmetic import Arithmetic
 from phigen.symbolic.expression import (
     EULER,
-    FUNCTIONS,
-    OWN,
     PI,
     Expression,
     call,
-    fold,
+    familiar,
     number,
     power,
     product,
@@ -31,6 +29,7 @@ from phigen.symbolic.expression import (
     symbols_of,
     total,
 )
+from phigen.symbolic.functions import FUNCTIONS
 from phigen.symbolic.special import SPECIAL, order_of
 from phigen.symbolic.symbols import plain
 
@@ -76,7 +75,8 @@ def _node(e: Any, args: list[Expression]) -> Expression:
         return power(args[0], args[1])
     name = type(e).__name__
     name = _FROM_SYMPY.get(name, name)
-    if FUNCTIONS.get(name) == len(args) and (name == "sign" or name not in OWN):
+    known = FUNCTIONS.get(name)
+    if known and known.arity == len(args) and (name == "sign" or not known.own):
         return call(name, *args)
     raise SpecError([Diagnostic(f"{e} has no counterpart in phigen", hint=f"known functions: {', '.join(FUNCTIONS)}")])
 
@@ -92,6 +92,30 @@ def closed_function(order: int, s: Any) -> Any:
     return sympy.diff((1 - sympy.sqrt(u) / 2 * sympy.cot(sympy.sqrt(u) / 2)) / u, u, order).subs(u, s)
 
 
+class _Sympy(Arithmetic[Any]):
+    """Expressions of sympy; see `to_sympy`."""
+
+    def __init__(self, symbols: Mapping[str, Any], special: Callable[[int, Any], Any]) -> None:
+        self._symbols, self._special = symbols, special
+
+    def constant(self, value: Fraction) -> Any:
+        return sympy.Rational(value.numerator, value.denominator)
+
+    def variable(self, name: str) -> Any:
+        own = plain(name).replace("λ_", "lambda_")
+        return self._symbols.get(name) or sympy.Symbol(own, real=True)
+
+    def power(self, base: Any, exponent: Fraction) -> Any:
+        return base ** self.constant(exponent)
+
+    def function(self, name: str, args: list[Any]) -> Any:
+        if not args:
+            return sympy.pi if name == "pi" else sympy.E
+        if name in SPECIAL:
+            return self._special(order_of(name), *args)
+        return args[0] ** args[1] if name == "power" else getattr(sympy, _TO_SYMPY.get(name, name))(*args)
+
+
 def to_sympy(
     e: Expression,
     symbols: Mapping[str, Any] | None = None,
@@ -99,57 +123,10 @@ def to_sympy(
 ) -> Any:
     """The expression in sympy, e.g. for ``sympy.latex``.
 
-    ``symbols`` are those of sympy by their names here; others are real, and ``p:x`` becomes ``p_x``. ``special`` says
-    what the derivatives of φ become.
+    ``symbols`` are those of sympy by their names here; others are real, and the momentum of x becomes ``p_x``.
+    ``special`` says what the derivatives of φ become.
     """
-    given = symbols or {}
-
-    def visit(node: Expression, args: list[Any]) -> Any:
-        match node.op:
-            case "number":
-                return sympy.Rational(node.value.numerator, node.value.denominator)
-            case "symbol":
-                own = plain(node.value).replace("λ_", "lambda_")
-                return given.get(node.value) or sympy.Symbol(own, real=True)
-            case "pi":
-                return sympy.pi
-            case "E":
-                return sympy.E
-            case "add":
-                return args[0] + args[1]
-            case "sub":
-                return args[0] - args[1]
-            case "neg":
-                return -args[0]
-            case "mul":
-                return args[0] * args[1]
-            case "pow":
-                return args[0] ** sympy.Rational(node.value.numerator, node.value.denominator)
-            case "power":
-                return args[0] ** args[1]
-        if node.op == "expm1":
-            return sympy.exp(args[0]) - 1
-        if node.op == "versin":
-            return 1 - sympy.cos(args[0])
-        if node.op == "log1p":
-            return sympy.log(1 + args[0])
-        if node.op == "inv":
-            return 1 / args[0]
-        if node.op in ENTIRE:
-            return _entire(node.op, *args)
-        if node.op in SPECIAL:
-            return special(order_of(node.op), *args)
-        return getattr(sympy, _TO_SYMPY.get(node.op, node.op))(*args)
-
-    return fold([e], visit)[0]
-
-
-def _entire(name: str, s: Any) -> Any:
-    """A function of `ENTIRE`, as its closed form for s > 0."""
-    root = sympy.sqrt(s)
-    cos, sin, relative = sympy.cos(root), sympy.sin(root) / root, (sympy.exp(s) - 1) / s
-    closed = {"cosroot": cos, "sinroot": sin, "sinroot1": (cos - sin) / (2 * s), "arcroot": (1 - sin) / s}
-    return (closed | {"exprel": relative, "exprel1": (sympy.exp(s) - relative) / s})[name]
+    return _Sympy(symbols or {}, special).values(familiar([e]))[0]
 
 
 @dataclass(frozen=True)

@@ -102,7 +102,7 @@ def _matrix(system: System, representation: Representation, tau: Expression | Se
         [total(pi * m[r][c] for pi, m in zip(p, basis, strict=True) if not m[r][c].is_zero) for c in range(size)]
         for r in range(size)
     ]
-    return MatrixFunction(combined).value(tau, MATRIX)
+    return MatrixFunction(combined, MATRIX).values([tau])[0]
 
 
 def _expect_tangent(system: System, representation: Representation, tau: Matrix) -> None:

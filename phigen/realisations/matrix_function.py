@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
+from fractions import Fraction
 
 from phigen.geometry.linear import inverse_matrix
 from phigen.realisations.protocol import refuse
-from phigen.symbolic.expression import ONE, ZERO, Expression, add, fold, rebuild, sub, total
+from phigen.symbolic.arithmetic import Arithmetic
+from phigen.symbolic.expression import ONE, ZERO, Expression, add, rebuild, sub, total
 
 Matrix = list[list[Expression]]
 
@@ -22,25 +24,23 @@ def multiplied(a: Matrix, b: Matrix) -> Matrix:
     return [[total(u * v for u, v in zip(row, column, strict=True)) for column in columns] for row in a]
 
 
-class MatrixFunction:
+class MatrixFunction(Arithmetic[Matrix]):
     """Values of expressions at a matrix P; numbers and parameters stand for multiples of the identity.
 
     All values are functions of P, hence commute, so that a quotient needs no side.
     """
 
-    def __init__(self, argument: Matrix) -> None:
-        self._argument, self._size = argument, len(argument)
+    def __init__(self, argument: Matrix, name: str) -> None:
+        """``name`` is the symbol that stands for the matrix."""
+        self._argument, self._size, self._name = argument, len(argument), name
 
-    def value(self, e: Expression, name: str) -> Matrix:
-        """The matrix e(P), P the symbol ``name``; raises `SpecError` for functions that are not rational in P."""
-        return fold([e], lambda node, args: self._visit(node, args, name))[0]
-
-    def _visit(self, node: Expression, args: Sequence[Matrix], name: str) -> Matrix:
-        if node.op == "symbol" and node.value == name:
+    def visit(self, node: Expression, args: list[Matrix]) -> Matrix:
+        """The value of a node; raises `SpecError` for functions that are not rational in P."""
+        if node.op == "symbol" and node.value == self._name:
             return self._argument
         if all(self._is_scalar(a) for a in args) and node.op not in ("add", "sub", "neg", "mul"):
             return self._scaled(rebuild(node, [a[0][0] for a in args]))
-        match node.op:
+        match node.op:  # lists know no arithmetic
             case "add":
                 return _entrywise(add, args[0], args[1])
             case "sub":
@@ -49,10 +49,16 @@ class MatrixFunction:
                 return [[-v for v in row] for row in args[0]]
             case "mul":
                 return multiplied(args[0], args[1])
-            case "pow" if node.value.denominator == 1:
-                return self._power(args[0], int(node.value))
+        return super().visit(node, args)
+
+    def power(self, base: Matrix, exponent: Fraction) -> Matrix:
+        """An integer power."""
+        return self._power(base, int(exponent)) if exponent.denominator == 1 else self.function("pow", [base])
+
+    def function(self, name: str, args: list[Matrix]) -> Matrix:
+        """`SpecError`: no function of a matrix is rational."""
         raise refuse(
-            f"birealisation group-map: tau uses {node.op} of a matrix; it must be a rational function of P",
+            f"birealisation group-map: tau uses {name} of a matrix; it must be a rational function of P",
             "kind: exponential is τ = exp(P); other functions are given entry by entry",
         )
 

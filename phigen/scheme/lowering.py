@@ -10,16 +10,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
-from phigen.symbolic.entire import ENTIRE
 from phigen.symbolic.expression import Expression, fold, raw, symbol, topological
-from phigen.symbolic.special import SPECIAL
+from phigen.symbolic.functions import FUNCTIONS
 from phigen.symbolic.symbols import TEMPORARY, Symbol
 
-#: Cost of an operation in units of one addition, as measured on current x86-64 processors (throughput). φ and its
-#: derivatives are nine-term series near 0, and a test.
+#: Cost of an operation in units of one addition, as measured on current x86-64 processors (throughput); a call is one
+#: of a function in the library.
 COST = {"add": 1, "sub": 1, "mul": 1, "neg": 0, "reciprocal": 4, "sqrt": 5, "call": 20}
-COST["inv"] = 5
-COST |= dict.fromkeys((*SPECIAL, *ENTIRE), 18)
 
 #: Longest tree that is printed as one statement, in operations.
 LONGEST = 14
@@ -87,7 +84,7 @@ def _cost(e: Expression) -> int:
         return {Fraction(2): 1, Fraction(-1): COST["reciprocal"], Fraction(1, 2): COST["sqrt"]}.get(
             e.value, COST["call"]
         )
-    return COST.get(e.op, COST["call"])
+    return FUNCTIONS[e.op].cost if e.op in FUNCTIONS else COST[e.op]
 
 
 def operation_counts(roots: Sequence[Expression]) -> dict[str, int]:

@@ -40,6 +40,7 @@ from phigen.symbolic.expression import (
     sub,
     symbol,
 )
+from phigen.symbolic.functions import FUNCTIONS
 from phigen.symbolic.symbols import Symbol
 
 CONSTANTS = {"pi": PI, "E": EULER}
@@ -402,21 +403,8 @@ def _brief(value: Fraction) -> str:
     return written if len(written) <= 40 else f"{float(value):.3e}"
 
 
-def _defined(function: str, first: Fraction, second: Fraction = Fraction(1)) -> bool:
-    match function:
-        case "sqrt":
-            return first >= 0
-        case "log":
-            return first > 0
-        case "asin" | "acos":
-            return abs(first) <= 1
-        case "acosh":
-            return first >= 1
-        case "atanh":
-            return abs(first) < 1
-        case "atan2":
-            return first != 0 or second != 0
-    return True
+def _defined(function: str, *arguments: Fraction) -> bool:
+    return arguments[0] >= 0 if function == "sqrt" else FUNCTIONS[function].defined(*arguments)
 
 
 def constant(expression: Expression) -> Fraction | None:

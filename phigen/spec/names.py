@@ -5,10 +5,10 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 
-from phigen.symbolic.expression import FUNCTIONS, OWN
+from phigen.symbolic.functions import FUNCTIONS
 
 #: Functions of expressions with their number of arguments.
-SPEC_FUNCTIONS: dict[str, int] = {"sqrt": 1} | {f: n for f, n in FUNCTIONS.items() if f not in OWN}
+SPEC_FUNCTIONS: dict[str, int] = {"sqrt": 1} | {f.name: f.arity for f in FUNCTIONS.values() if not f.own}
 
 SPEC_NAME = r"[a-z][a-z0-9_]{0,30}"
 IDENTIFIER = r"[A-Za-z_][A-Za-z0-9_]*"

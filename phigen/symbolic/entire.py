@@ -21,19 +21,23 @@ from typing import Any
 #: Terms beyond this, relative to the first, are left out of a series in double precision.
 NEGLIGIBLE = 1e-17
 
+_HALF = Fraction(1, 2)
+
 
 @dataclass(frozen=True)
 class Entire:
     """A function Σ c_n s^n: its coefficients, and the closed form that is used for |s| > ``radius``.
 
-    ``closed`` takes a library of functions (math or an mpmath context) and s. ``derivative`` is a factor and the name
-    of a function, None where it is not available. ``meaning`` is for the comments of generated code.
+    ``closed`` takes a library of functions (math or an mpmath context) and s. ``known`` is that for s > 0, and
+    ``slopes`` is the derivative, as `phigen.symbolic.functions` has them; None where there is no derivative.
+    ``meaning`` is for the comments of generated code.
     """
 
     meaning: str
     coefficient: Callable[[int], Fraction]
     closed: Callable[[Any, Any], Any]
-    derivative: tuple[Fraction, str] | None
+    known: Callable[..., Any]
+    slopes: Callable[..., tuple[Any, ...]] | None
     radius: float
 
     def terms(self) -> list[Fraction]:
@@ -77,20 +81,23 @@ ENTIRE: dict[str, Entire] = {
         "cos(sqrt(s)), cosh(sqrt(-s)) for negative s",
         lambda n: (-1) ** n * _factorial(2 * n),
         _cosroot,
-        (Fraction(-1, 2), "sinroot"),
+        lambda call, s: call("cos", s**_HALF),
+        lambda call, f, s: (-_HALF * call("sinroot", s),),
         1.0,
     ),
     "sinroot": Entire(
         "sin(sqrt(s))/sqrt(s), sinh(sqrt(-s))/sqrt(-s) for negative s",
         lambda n: (-1) ** n * _factorial(2 * n + 1),
         _sinroot,
-        (Fraction(1), "sinroot1"),
+        lambda call, s: call("sin", s**_HALF) / s**_HALF,
+        lambda call, f, s: (call("sinroot1", s),),
         1.0,
     ),
     "sinroot1": Entire(
         "the derivative of sin(sqrt(s))/sqrt(s)",
         lambda n: (-1) ** (n + 1) * (n + 1) * _factorial(2 * n + 3),
         _sinroot1,
+        lambda call, s: (call("cosroot", s) - call("sinroot", s)) / (2 * s),
         None,
         1.0,
     ),
@@ -98,11 +105,26 @@ ENTIRE: dict[str, Entire] = {
         "(sqrt(s) - sin(sqrt(s)))/sqrt(s)**3, with sinh for negative s",
         lambda n: (-1) ** n * _factorial(2 * n + 3),
         _arcroot,
-        None,
+        lambda call, s: (1 - call("sinroot", s)) / s,
+        lambda call, f, s: ((call("sinroot", s / 4) ** 2 / 2 - 3 * f) / (2 * s),),
         1.0,
     ),
-    "exprel": Entire("(exp(s) - 1)/s", lambda n: _factorial(n + 1), _exprel, (Fraction(1), "exprel1"), 0.5),
-    "exprel1": Entire("the derivative of (exp(s) - 1)/s", lambda n: (n + 1) * _factorial(n + 2), _exprel1, None, 0.5),
+    "exprel": Entire(
+        "(exp(s) - 1)/s",
+        lambda n: _factorial(n + 1),
+        _exprel,
+        lambda call, s: (call("exp", s) - 1) / s,
+        lambda call, f, s: (call("exprel1", s),),
+        0.5,
+    ),
+    "exprel1": Entire(
+        "the derivative of (exp(s) - 1)/s",
+        lambda n: (n + 1) * _factorial(n + 2),
+        _exprel1,
+        lambda call, s: (call("exp", s) - call("exprel", s)) / s,
+        None,
+        0.5,
+    ),
 }
 
 
@@ -127,3 +149,8 @@ def precisely(context: Any, name: str, s: Any) -> Any:
         c = function.coefficient(n)
         value = value * s + context.mpf(c.numerator) / c.denominator
     return value
+
+
+def value(library: Any, name: str, s: Any) -> Any:
+    """The value in double precision if the library is `math`, else to that of an mpmath context."""
+    return in_double(name, s) if library is math else precisely(library, name, s)

@@ -17,7 +17,7 @@ op          value                   args
 ``neg``     ``None``                (a,)
 ``mul``     ``None``                (a, b)
 ``pow``     the rational exponent   (base,)
-a function  ``None``                its arguments, see `FUNCTIONS`
+a function  ``None``                its arguments, see `phigen.symbolic.functions`
 =========== ======================= =====================================
 
 A quotient is a product with a ``pow`` of exponent −1. Names of symbols that phigen makes itself contain
@@ -35,37 +35,7 @@ from hashlib import blake2b
 from typing import Any, TypeVar
 from weakref import WeakValueDictionary
 
-from phigen.symbolic.entire import ENTIRE
-from phigen.symbolic.special import SPECIAL, coefficient, order_of
-
-#: Functions of an expression, with their number of arguments.
-FUNCTIONS: dict[str, int] = {
-    "exp": 1,
-    "expm1": 1,  # exp(a) − 1 without cancellation, of phigen's own, not accepted in a spec
-    "versin": 1,  # 1 − cos(a) without cancellation, likewise
-    "log1p": 1,  # log(1 + a) without cancellation
-    "inv": 1,  # 1/a where a > 0, else not a number: beyond the pole of a flow there is no solution
-    "log": 1,
-    "sin": 1,
-    "cos": 1,
-    "tan": 1,
-    "asin": 1,
-    "acos": 1,
-    "atan": 1,
-    "atan2": 2,
-    "sinh": 1,
-    "cosh": 1,
-    "tanh": 1,
-    "asinh": 1,
-    "acosh": 1,
-    "atanh": 1,
-    "abs": 1,
-    "sign": 1,  # made by differentiating abs, not accepted in a spec
-    "power": 2,  # base**exponent with an exponent that is not a rational number
-} | dict.fromkeys((*SPECIAL, *ENTIRE), 1)  # of the exponential bi-realisation and of flows, not accepted in a spec
-
-#: Functions of phigen's own, which a spec cannot name.
-OWN = ("sign", "power", "expm1", "versin", "log1p", "inv", *SPECIAL, *ENTIRE)
+from phigen.symbolic.functions import FUNCTIONS
 
 _NODES: WeakValueDictionary[tuple[Any, ...], Expression] = WeakValueDictionary()
 _RANK = {"number": 0, "pi": 1, "E": 1, "symbol": 2}
@@ -324,22 +294,16 @@ def sqrt(a: Expression) -> Expression:
 
 def call(function: str, *args: Expression) -> Expression:
     """function(args), for a name in `FUNCTIONS`; values that are rational at 0 and 1 are folded."""
-    if FUNCTIONS[function] != len(args):
-        raise ValueError(f"{function} takes {FUNCTIONS[function]} argument(s), not {len(args)}")
+    known = FUNCTIONS[function]
+    if known.arity != len(args):
+        raise ValueError(f"{function} takes {known.arity} argument(s), not {len(args)}")
     first = args[0]
-    if len(args) == 1 and first.is_zero:
-        if function in ENTIRE:
-            return number(ENTIRE[function].coefficient(0))
-        if function in SPECIAL:
-            return number(coefficient(order_of(function), 0))
-        if function in ("exp", "cos", "cosh"):
-            return ONE
-        if function not in ("log", "acos", "acosh"):
-            return ZERO
+    if first.is_zero and len(args) == 1 and known.at_zero is not None:
+        return number(known.at_zero)
     if function == "log" and first is ONE:
         return ZERO
-    if function in ("abs", "sign") and first.is_number:
-        return number(abs(first.value) if function == "abs" else (first.value > 0) - (first.value < 0))
+    if known.rational and known.value and first.is_number:
+        return number(known.value(None, first.value))
     return _node(function, args)
 
 
@@ -400,24 +364,30 @@ def fold(roots: Sequence[Expression], visit: Callable[[Expression, list[T]], T])
     return [values[id(r)] for r in roots]
 
 
+_BUILDERS: dict[str, Callable[..., Expression]] = {"add": add, "sub": sub, "neg": neg, "mul": mul, "power": power}
+
+
 def rebuild(node: Expression, args: Sequence[Expression]) -> Expression:
     """The node with other arguments, simplified anew."""
     if not node.args:
         return node
-    match node.op:
-        case "add":
-            return add(*args)
-        case "sub":
-            return sub(*args)
-        case "neg":
-            return neg(*args)
-        case "mul":
-            return mul(*args)
-        case "pow":
-            return power(args[0], node.value)
-        case "power":
-            return power(args[0], args[1])
-    return call(node.op, *args)
+    if node.op == "pow":
+        return power(args[0], node.value)
+    build = _BUILDERS.get(node.op)
+    return build(*args) if build else call(node.op, *args)
+
+
+def familiar(roots: Sequence[Expression]) -> list[Expression]:
+    """The roots with functions of phigen's own written by those that readers know, for s > 0 where that matters."""
+
+    def visit(node: Expression, args: list[Expression]) -> Expression:
+        known = FUNCTIONS[node.op].known if node.op in FUNCTIONS else None
+        if known:
+            return familiar([known(call, *args)])[0]
+        same = all(a is b for a, b in zip(args, node.args, strict=True))
+        return node if same else rebuild(node, args)
+
+    return fold(roots, visit)
 
 
 def substitute(roots: Sequence[Expression], values: Mapping[str, Expression]) -> list[Expression]:
@@ -447,58 +417,10 @@ def partials(e: Expression) -> list[Expression]:
             return [e.args[1], a]
         case "pow":
             return [e.value * power(a, e.value - 1)]
-        case "power":
-            return [e * e.args[1] / a, e * call("log", a)]
-        case "exp":
-            return [e]
-        case "expm1":
-            return [1 + e]
-        case "versin":
-            return [call("sin", a)]
-        case "log1p":
-            return [1 / (1 + a)]
-        case "inv":
-            return [-(e**2)]
-        case "log":
-            return [1 / a]
-        case "sin":
-            return [call("cos", a)]
-        case "cos":
-            return [-call("sin", a)]
-        case "tan":
-            return [1 + e**2]
-        case "asin":
-            return [power(1 - a**2, Fraction(-1, 2))]
-        case "acos":
-            return [-power(1 - a**2, Fraction(-1, 2))]
-        case "atan":
-            return [1 / (1 + a**2)]
-        case "atan2":
-            radius = 1 / (a**2 + e.args[1] ** 2)
-            return [e.args[1] * radius, -a * radius]
-        case "sinh":
-            return [call("cosh", a)]
-        case "cosh":
-            return [call("sinh", a)]
-        case "tanh":
-            return [1 - e**2]
-        case "asinh":
-            return [power(1 + a**2, Fraction(-1, 2))]
-        case "acosh":
-            return [power(a**2 - 1, Fraction(-1, 2))]
-        case "atanh":
-            return [1 / (1 - a**2)]
-        case "abs":
-            return [call("sign", a)]
-        case "sign":
-            return [ZERO]
-        case "phi0" | "phi1":
-            return [call(SPECIAL[order_of(e.op) + 1], a)]
-        case "arcroot":
-            return [(call("sinroot", a / 4) ** 2 / 2 - 3 * e) / (2 * a)]
-        case op if op in ENTIRE and (rule := ENTIRE[op].derivative):
-            return [number(rule[0]) * call(rule[1], a)]
-    raise ValueError(f"no derivative is known for {e.op}")
+    slopes = FUNCTIONS[e.op].slopes
+    if slopes is None:
+        raise ValueError(f"no derivative is known for {e.op}")
+    return [as_expression(d) for d in slopes(call, e, *e.args)]
 
 
 def derivatives(roots: Sequence[Expression], name: str) -> list[Expression]:

@@ -7,11 +7,13 @@ from collections.abc import Callable, Mapping, Sequence
 from fractions import Fraction
 from typing import Any
 
-from phigen.symbolic import entire
+from phigen.symbolic.arithmetic import Arithmetic
 from phigen.symbolic.expression import Expression, fold, topological
-from phigen.symbolic.special import SPECIAL, in_double, order_of, precisely
+from phigen.symbolic.functions import FUNCTIONS
 
-_RATIONAL = frozenset({"number", "symbol", "add", "sub", "neg", "mul", "abs", "sign"})
+_RATIONAL = frozenset(
+    ["number", "symbol", "add", "sub", "neg", "mul", *(f.name for f in FUNCTIONS.values() if f.rational)]
+)
 
 
 class DomainError(ArithmeticError):
@@ -31,13 +33,13 @@ def evaluate(roots: Sequence[Expression], values: Mapping[str, float]) -> list[f
     Raises `DomainError` outside the real domain, on overflow, and KeyError for a symbol without value.
     """
     with_floats = {name: float(v) for name, v in values.items()}
-    return _guarded(lambda: fold(roots, _visitor(with_floats, float, math, math.pow)))
+    return _guarded(lambda: Numbers(with_floats, float, math, math.pow).values(roots))
 
 
 def evaluate_exactly(roots: Sequence[Expression], values: Mapping[str, Fraction]) -> list[Fraction]:
     """Exact values of roots for which `is_rational` holds; raises `DomainError` and KeyError as `evaluate`."""
     exact = {name: Fraction(v) for name, v in values.items()}
-    return _guarded(lambda: fold(roots, _visitor(exact, Fraction, None, _exact_power)))
+    return _guarded(lambda: Numbers(exact, Fraction, None, _exact_power).values(roots))
 
 
 def evaluate_precisely(roots: Sequence[Expression], values: Mapping[str, Fraction], digits: int = 50) -> list[Any]:
@@ -57,14 +59,14 @@ def evaluate_with_scale(
     """
     context = _mpmath_context(digits)
 
-    def convert(v: Fraction) -> Any:
-        return context.mpf(v.numerator) / v.denominator
+    def convert(v: Any) -> Any:
+        return context.mpf(v.numerator) / v.denominator if isinstance(v, Fraction | int) else v
 
     exact = {name: convert(Fraction(v)) for name, v in values.items()}
-    value_of = _visitor(exact, convert, context, lambda b, e: _precise_power(context, b, e))
+    numbers = Numbers(exact, convert, context, lambda b, e: _precise_power(context, b, e))
 
     def visit(node: Expression, args: list[tuple[Any, Any]]) -> tuple[Any, Any]:
-        value = value_of(node, [a for a, _ in args])
+        value = numbers.visit(node, [a for a, _ in args])
         if not isinstance(value, context.mpf) or not context.isfinite(value):
             raise DomainError(f"{node.op} has no finite real value here")
         return value, max([context.one, abs(value), *(scale for _, scale in args)])
@@ -101,53 +103,43 @@ def _mpmath_context(digits: int) -> Any:
     return context
 
 
-def _inverse(value: Any) -> Any:
-    if value <= 0:
-        raise ValueError("inv of a value that is not positive")
-    return 1 / value
+class Numbers(Arithmetic[Any]):
+    """Numbers of one kind, made by ``convert``; functions come from ``library`` (math or an mpmath context), if any."""
 
+    def __init__(
+        self,
+        values: Mapping[str, Any],
+        convert: Callable[[Any], Any],
+        library: Any,
+        power: Callable[[Any, Any], Any],
+    ) -> None:
+        self._values, self._convert, self._library, self._power = values, convert, library, power
 
-def _visitor(
-    values: Mapping[str, Any], convert: Callable[[Any], Any], library: Any, power: Callable[[Any, Any], Any]
-) -> Callable[[Expression, list[Any]], Any]:
-    """The value of a node from those of its arguments, functions taken from ``library`` (math or an mpmath context)."""
+    def constant(self, value: Fraction) -> Any:
+        """A rational number."""
+        return self._convert(value)
 
-    def visit(node: Expression, args: list[Any]) -> Any:
-        match node.op:
-            case "number":
-                return convert(node.value)
-            case "symbol":
-                return values[node.value]
-            case "add":
-                return args[0] + args[1]
-            case "sub":
-                return args[0] - args[1]
-            case "neg":
-                return -args[0]
-            case "mul":
-                return args[0] * args[1]
-            case "pow":
-                return power(args[0], node.value)
-            case "power":
-                return power(args[0], args[1])
-            case "abs":
-                return abs(args[0])
-            case "sign":
-                return convert((args[0] > 0) - (args[0] < 0))
-        if library is None:
-            raise DomainError(f"{node.op} is not rational")
-        if node.op == "versin":
-            return 2 * library.sin(args[0] / 2) ** 2
-        if node.op == "inv":
-            return _inverse(args[0])
-        if node.op in ("pi", "E"):
-            return +getattr(library, node.op.lower())
-        if node.op in entire.ENTIRE:
-            in_floats = library is math
-            return entire.in_double(node.op, args[0]) if in_floats else entire.precisely(library, node.op, args[0])
-        if node.op in SPECIAL:
-            order = order_of(node.op)
-            return in_double(order, args[0]) if library is math else precisely(library, order, args[0])
-        return getattr(library, node.op)(*args)
+    def variable(self, name: str) -> Any:
+        """The value given for a symbol."""
+        return self._values[name]
 
-    return visit
+    def power(self, base: Any, exponent: Fraction) -> Any:
+        """A number to a rational power."""
+        return self._power(base, exponent)
+
+    def function(self, name: str, args: list[Any]) -> Any:
+        """A function, by the library or by its own rule."""
+        if name in ("pi", "E"):
+            return +getattr(self._expected(name), name.lower())
+        if name == "power":
+            return self._power(*args)
+        known = FUNCTIONS[name]
+        if known.rational and known.value:
+            return self._convert(known.value(None, *args))
+        library = self._expected(name)
+        return known.value(library, *args) if known.value else getattr(library, name)(*args)
+
+    def _expected(self, name: str) -> Any:
+        if self._library is None:
+            raise DomainError(f"{name} is not rational")
+        return self._library

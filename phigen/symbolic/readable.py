@@ -17,17 +17,19 @@ from phigen.symbolic.expression import (
     text,
     topological,
 )
+from phigen.symbolic.functions import FUNCTIONS
+from phigen.symbolic.special import SPECIAL
 from phigen.symbolic.symbols import Symbol, plain
 from phigen.symbolic.tower import Poly, Tower, rational
 
 #: Terms of a formula that are shown unless all are asked for.
 SHOWN = 8
 
+#: Names of φ and its derivatives for readers, as text.
+_GREEK = {name: FUNCTIONS[name].letters.replace("′", "'").replace("″", "''") for name in SPECIAL}
+
 #: The longest formula in a message.
 LONGEST = 160
-
-#: Functions of phigen's own that have a name in mathematics.
-_GREEK = {"phi0": "φ", "phi1": "φ'", "phi2": "φ''"}
 
 #: Formulas with more nodes than this are not expanded to look for a shorter form.
 _LARGE = 400

@@ -92,6 +92,11 @@ def precisely(context: Any, order: int, s: Any) -> Any:
     return _closed(order, s, w / (context.tan(w) if s > 0 else context.tanh(w)))
 
 
+def value(library: Any, order: int, s: Any) -> Any:
+    """The value in double precision if the library is `math`, else to that of an mpmath context."""
+    return in_double(order, s) if library is math else precisely(library, order, s)
+
+
 def _closed(order: int, s: Any, c: Any) -> Any:
     """The value from c = w cot w (w coth w for s < 0), by the Riccati equation."""
     phi0 = (1 - c) / s

@@ -13,6 +13,7 @@ from collections.abc import Sequence, Sized
 from fractions import Fraction
 from typing import Any, Protocol
 
+from phigen.symbolic.arithmetic import Arithmetic
 from phigen.symbolic.expression import (
     EULER,
     PI,
@@ -42,7 +43,7 @@ class Ring(Protocol):
         """A symbol as an element."""
 
     def function(self, name: str, args: list[Any]) -> Any:
-        """An elementary function (or ``constant:pi``, ``constant:E`` with no arguments)."""
+        """An elementary function (or ``pi``, ``E`` with no arguments)."""
 
     def power(self, base: Any, exponent: Fraction | int) -> Any:
         """A rational power."""
@@ -54,7 +55,7 @@ class Ring(Protocol):
         """Whether the element is 0 in its own form (no relations used)."""
 
 
-class ExpressionRing:
+class ExpressionRing(Arithmetic[Expression]):
     """The ring of expression graphs: no expansion, sub-expressions shared."""
 
     def constant(self, value: int | Fraction) -> Expression:
@@ -67,9 +68,9 @@ class ExpressionRing:
 
     def function(self, name: str, args: list[Expression]) -> Expression:
         """A call, or one of the constants."""
-        if name.startswith("constant:"):
-            return PI if name.endswith("pi") else EULER
-        return call(name, *args)
+        if not args:
+            return PI if name == "pi" else EULER
+        return power(*args) if name == "power" else call(name, *args)
 
     def power(self, base: Expression, exponent: Fraction | int) -> Expression:
         """A power node."""
@@ -152,7 +153,7 @@ class Taylor:
             return self.ring.constant(e.value)
         if e.op == "symbol":
             return self.ring.variable(e.value)
-        return self.ring.function("constant:" + e.op, [])
+        return self.ring.function(e.op, [])
 
     def _convolve(self, a: list[Any], b: list[Any], i: int) -> Any:
         zero = self.ring.vanishes

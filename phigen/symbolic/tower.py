@@ -15,17 +15,16 @@ from typing import Any
 
 from flint import Ordering, fmpq, fmpq_mpoly_ctx
 
+from phigen.symbolic.arithmetic import Arithmetic
 from phigen.symbolic.entire import ENTIRE
-from phigen.symbolic.expression import EULER, ONE, PI, Expression, call, derivatives, fold, number, power, symbol
+from phigen.symbolic.expression import EULER, ONE, PI, Expression, call, derivatives, number, power, symbol
+from phigen.symbolic.functions import FUNCTIONS
 from phigen.symbolic.horner import horner
 from phigen.symbolic.special import SPECIAL, coefficient, order_of
 from phigen.symbolic.symbols import Symbol
 
 #: An element of a tower: ``flint.fmpq_mpoly``. Elements of different towers do not mix.
 Poly = Any
-
-_EVEN = frozenset({"cos", "cosh"})
-_ODD = frozenset({"sin", "tan", "asin", "atan", "sinh", "tanh", "asinh", "atanh", "sign"})
 
 
 @dataclass
@@ -52,7 +51,7 @@ class _MissingError(Exception):
         self.kind, self.arguments, self.degree, self.inverse = kind, arguments, degree, inverse
 
 
-class Tower:
+class Tower(Arithmetic[Poly]):
     """The ring Q[symbols, generators] that holds the given expressions and their derivatives.
 
     ``symbols`` are the polynomial variables, ``expressions`` what must be representable, and
@@ -149,47 +148,20 @@ class Tower:
     def convert_all(self, expressions: Sequence[Expression]) -> list[Poly]:
         """`convert` for several expressions that share parts."""
         try:
-            return fold(expressions, self._visit)
+            return self.values(expressions)
         except _MissingError as missing:
             raise ValueError(f"the ring has no generator for {missing.kind}") from None
 
     def _convert(self, e: Expression) -> Poly:
-        return fold([e], self._visit)[0]
-
-    def _visit(self, e: Expression, args: list[Poly]) -> Poly:
-        match e.op:
-            case "number":
-                return self.constant(e.value)
-            case "symbol":
-                return self.variable(e.value)
-            case "add":
-                return args[0] + args[1]
-            case "sub":
-                return args[0] - args[1]
-            case "neg":
-                return -args[0]
-            case "mul":
-                return args[0] * args[1]
-            case "pow":
-                return self.power(args[0], e.value)
-            case "pi" | "E":
-                return self.function("constant:" + e.op, [])
-            case _:
-                return self.function(e.op, args)
+        return self.values([e])[0]
 
     def function(self, name: str, args: list[Poly]) -> Poly:
         """A function of elements, where the tower has it (used for constant terms of series)."""
-        if name.startswith("constant:"):
+        if not args:
             return self._generator(name, [])
         args = [self.cancelled(a) for a in args]
         if name == "abs":
             return self.function("sign", args) * args[0]
-        if name == "expm1":
-            return self.function("exp", args) - 1
-        if name == "versin":
-            return 1 - self.function("cos", args)
-        if name == "log1p":
-            return self.function("log", [1 + args[0]])
         if name == "inv":
             return self._reciprocal(args[0])
         first = args[0]
@@ -197,16 +169,17 @@ class Tower:
             return self._entire(name, first)
         if name in SPECIAL:
             return self._special(order_of(name), first)
-        if len(args) == 1 and first.is_constant() and first == 0 and name in ("exp", "cos", "cosh"):
-            return self.constant(1)
-        if len(args) == 1 and first.is_constant() and first == 0 and name not in ("log", "acos", "acosh"):
-            return self.zero
+        known = FUNCTIONS[name]
+        if known.known:
+            return known.known(lambda f, *a: self.function(f, list(a)), *args)
+        if known.arity == 1 and known.at_zero is not None and first.is_constant() and first == 0:
+            return self.constant(known.at_zero)
         if name == "log" and first == 1:
             return self.zero
-        if name in _EVEN | _ODD and rational(first.leading_coefficient()) < 0:
+        if known.parity and rational(first.leading_coefficient()) < 0:
             # One generator for f(q) and f(-q).
             mirrored = self._generator(name, [-first])
-            return mirrored if name in _EVEN else -mirrored
+            return mirrored if known.parity == "even" else -mirrored
         if name == "exp":
             for g in self.generators:
                 ratio = _ratio(first, g.arguments[0]) if g.kind == "exp" else None
@@ -505,9 +478,9 @@ def _integer_root(value: int, degree: int) -> int | None:
 
 
 def _generator_expression(kind: str, args: list[Expression], degree: int, inverse: bool) -> Expression:
-    if kind == "constant:pi":
+    if kind == "pi":
         return PI
-    if kind == "constant:E":
+    if kind == "E":
         return EULER
     if kind == "reciprocal":
         return ONE / args[0]

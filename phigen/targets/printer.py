@@ -5,9 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from fractions import Fraction
 
-from phigen.symbolic.entire import ENTIRE
 from phigen.symbolic.expression import Expression, fold
-from phigen.symbolic.special import SPECIAL
 
 #: Binding strength: sums, products, atoms. Unary minus is printed in parentheses inside products.
 SUM, PRODUCT, ATOM = 1, 2, 3
@@ -59,8 +57,6 @@ class Printer:
                 return self._power(e.value, args[0])
             case "pi" | "E":
                 return self.constants[e.op], ATOM
-            case op if op in SPECIAL or op in ENTIRE:  # a function of the generated file, whose name is chosen there
-                return f"{self.name('function:' + op)}({args[0][0]})", ATOM
             case op if "{0}" in self.functions[op]:
                 return self.functions[op].format(args[0][0]), ATOM
             case _:

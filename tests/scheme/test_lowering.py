@@ -10,7 +10,8 @@ from support import NAMES, compile_text, compiled, symbols, values
 
 from phigen.scheme.lowering import LONGEST, assign, cost, expand_powers, operation_counts
 from phigen.scheme.staging import Coefficients
-from phigen.symbolic.expression import FUNCTIONS, number, power, sqrt, symbols_of, topological
+from phigen.symbolic.expression import number, power, sqrt, symbols_of, topological
+from phigen.symbolic.functions import FUNCTIONS
 from phigen.symbolic.symbols import STEP, coefficient
 from phigen.targets.printer import Printer
 

@@ -35,14 +35,6 @@ def test_at_zero(name):
     assert evaluate([call(name, s)], {"s": 0.0}) == [float(ENTIRE[name].coefficient(0))]
 
 
-@pytest.mark.parametrize("name", [n for n in ENTIRE if ENTIRE[n].derivative])
-def test_derivatives_are_those_of_the_series(name):
-    factor, slope = ENTIRE[name].derivative
-    for n in range(10):
-        assert (n + 1) * ENTIRE[name].coefficient(n + 1) == factor * ENTIRE[slope].coefficient(n)
-    assert derivative(call(name, 3 * s), "s") is 3 * (number(factor) * call(slope, 3 * s))
-
-
 def test_tangent_maps_need_no_second_derivatives():
     with pytest.raises(ValueError, match="no derivative is known for sinroot1"):
         derivative(call("sinroot1", s), "s")

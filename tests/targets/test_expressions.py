@@ -10,7 +10,8 @@ from support import TARGETS, compile_text, solver, values
 
 from phigen.scheme.kernel import Kernel, Output
 from phigen.symbolic.entire import ENTIRE
-from phigen.symbolic.expression import EULER, FUNCTIONS, ONE, PI, call, number, power, raw, symbol
+from phigen.symbolic.expression import EULER, ONE, PI, call, number, power, raw, symbol
+from phigen.symbolic.functions import FUNCTIONS
 from phigen.symbolic.special import SPECIAL
 
 x, y, z = symbol("x"), symbol("y"), symbol("z")

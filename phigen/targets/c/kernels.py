@@ -9,8 +9,7 @@ from dataclasses import dataclass, field, replace
 
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.program import Program
-from phigen.symbolic.entire import ENTIRE
-from phigen.symbolic.special import SPECIAL
+from phigen.symbolic import functions as elementary
 from phigen.symbolic.symbols import WORK, Symbol, kind_of
 from phigen.targets.code import Code, lower, parts
 from phigen.targets.header import plain
@@ -18,15 +17,7 @@ from phigen.targets.names import Scope, identifiers
 from phigen.targets.printer import Printer
 from phigen.targets.reserved import C_RESERVED
 
-_SAME: tuple[str, ...] = ("exp", "expm1", "log", "sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sinh", "cosh")
-_SAME += ("tanh", "asinh", "acosh", "atanh", "sqrt", "cbrt", "log1p")
-FUNCTIONS = {name: name for name in _SAME} | {
-    "abs": "fabs",
-    "power": "pow",
-    "sign": "(double)(({0} > 0.0) - ({0} < 0.0))",
-    "inv": "({0} > 0.0 ? 1.0 / ({0}) : (double)NAN)",
-    "versin": "(2.0 * sin(0.5 * ({0})) * sin(0.5 * ({0})))",
-}
+FUNCTIONS = elementary.written_in("c")
 # Digits, since -std=c99 hides M_PI.
 CONSTANTS = {"pi": "3.141592653589793", "E": "2.718281828459045"}
 
@@ -37,13 +28,8 @@ LONGEST_FUNCTION = 200
 LANES = 8
 
 #: Functions with a version of their own for the loops over lanes, and those that are formulas of these.
-LANE_FUNCTIONS = ("exp", "expm1", "log", "sin", "cos", *SPECIAL)
-LANE_FORMULAS = {
-    "versin": "(2.0 * {sin}(0.5 * ({{0}})) * {sin}(0.5 * ({{0}})))",
-    "sinh": "(0.5 * ({expm1}({{0}}) - {expm1}(-({{0}}))))",
-    "cosh": "(0.5 * ({exp}({{0}}) + {exp}(-({{0}}))))",
-    "tanh": "({expm1}(2.0 * ({{0}})) / ({expm1}(2.0 * ({{0}})) + 2.0))",
-}
+LANE_FUNCTIONS = tuple(f.name for f in elementary.FUNCTIONS.values() if f.lanes == f.name)
+LANE_FORMULAS = {f.name: f.lanes for f in elementary.FUNCTIONS.values() if f.lanes not in ("", f.name)}
 
 
 def function(
@@ -170,11 +156,9 @@ def wrapped_arguments(head: str, arguments: Sequence[str]) -> list[str]:
 
 def _body(program: Program, kernel: Kernel, form: Form, code: Code) -> list[str]:
     arrays = [*kernel.inputs, *(o.name for o in kernel.outputs), "work", "lane"]
-    special = {f"function:{f}": form.functions.get(f, f"{program.name}_{f}") for f in (*SPECIAL, *ENTIRE)}
-    called = re.findall(r"[A-Za-z_]\w*", " ".join([*special.values(), *form.functions.values()]))
+    calls = {f: f"{program.name}_{f}" for f in elementary.FUNCTIONS} | dict(form.functions)
+    called = re.findall(r"[A-Za-z_]\w*", " ".join(calls.values()))
     scope = Scope(C_RESERVED | {*arrays, *called})
-    for f, name in special.items():
-        scope.bind(f, name)
     member = members(program)
     lines: list[str] = []
     touched: set[str] = set()
@@ -193,7 +177,7 @@ def _body(program: Program, kernel: Kernel, form: Form, code: Code) -> list[str]
                 lines.append(f"    const double {scope[s]} = {array}[{i}]{form.lane(array)};")
     for k in range(form.workspace):
         scope.bind(Symbol(WORK, k), f"work[{k}]{form.lane('work')}")
-    show = printer(scope, form.functions)
+    show = printer(scope, calls)
     for a in code.assignments:
         declare = "" if kind_of(a.target) == WORK else "const double "
         lines.append(f"    {declare}{scope[a.target]} = {show(a.value)};")

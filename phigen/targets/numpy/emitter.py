@@ -9,9 +9,8 @@ from dataclasses import replace
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.program import Program
 from phigen.scheme.steps import PLAUSIBLE, Explicit, Implicit, InnerSolve, Newton, Path, Splitting
-from phigen.symbolic.entire import ENTIRE
+from phigen.symbolic import functions as elementary
 from phigen.symbolic.expression import Expression
-from phigen.symbolic.special import SPECIAL
 from phigen.symbolic.symbols import Symbol
 from phigen.targets import special
 from phigen.targets.code import Code, lower
@@ -25,23 +24,8 @@ from phigen.targets.reserved import PYTHON_RESERVED
 #: Most terms of the expansion of a path, as in the C target.
 TERMS = 30
 
-FUNCTIONS = {
-    "asin": "np.arcsin",
-    "acos": "np.arccos",
-    "atan": "np.arctan",
-    "atan2": "np.arctan2",
-    "asinh": "np.arcsinh",
-    "acosh": "np.arccosh",
-    "atanh": "np.arctanh",
-    "abs": "np.abs",
-    "power": "np.power",
-    "sign": "np.sign({0})",
-    "inv": "np.where({0} > 0.0, 1.0 / ({0}), np.nan)",
-    "versin": "(2.0 * np.sin(0.5 * ({0})) ** 2)",
-} | {
-    name: f"np.{name}"
-    for name in ["exp", "expm1", "log1p", "log", "sin", "cos", "tan", "sinh", "cosh", "tanh", "sqrt", "cbrt"]
-}
+#: How functions are written: those of NumPy, and those that the file defines.
+FUNCTIONS = {name: f"_{name}" for name in elementary.FUNCTIONS} | elementary.written_in("numpy")
 CONSTANTS = {"pi": "np.pi", "E": "np.e"}
 
 
@@ -174,10 +158,8 @@ def _function(program: Program, kernel: Kernel) -> str:
     code = lower(kernel)
     arguments = ", ".join("parameters" if i == "params" else i for i in kernel.inputs)
     lines = [f"def _{kernel.name}({arguments}):", *_docstring(kernel.purpose)]
-    own = (*SPECIAL, *ENTIRE)
-    scope = Scope(PYTHON_RESERVED | {*kernel.inputs, *(o.name for o in kernel.outputs), *(f"_{f}" for f in own)})
-    for f in own:
-        scope.bind(f"function:{f}", f"_{f}")
+    reserved = PYTHON_RESERVED | {*kernel.inputs, *(o.name for o in kernel.outputs), *FUNCTIONS.values()}
+    scope = Scope(reserved)
     lines += _bindings(kernel, code, scope)
     printer = _printer(scope)
     lines += [f"    {scope[a.target]} = {printer(a.value)}" for a in code.assignments]

@@ -1,0 +1,54 @@
+"""The one interpreter of expressions: values of them in any kind of arithmetic."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+from typing import Any, Generic, TypeVar
+
+from phigen.symbolic.expression import Expression, fold
+
+T = TypeVar("T")
+
+
+class Arithmetic(Generic[T]):
+    """A kind of values that expressions may have; ``+``, ``-`` and ``*`` are those of the values themselves."""
+
+    def constant(self, value: Fraction) -> T:
+        """A rational number as a value."""
+        raise NotImplementedError
+
+    def variable(self, name: str) -> T:
+        """The value of a symbol."""
+        raise NotImplementedError
+
+    def power(self, base: T, exponent: Fraction) -> T:
+        """A value to a rational power."""
+        raise NotImplementedError
+
+    def function(self, name: str, args: list[T]) -> T:
+        """A function in `phigen.symbolic.functions.FUNCTIONS`, or ``pi`` or ``E`` without arguments."""
+        raise NotImplementedError
+
+    def visit(self, node: Expression, args: list[Any]) -> T:
+        """The value of a node from those of its arguments."""
+        match node.op:
+            case "number":
+                return self.constant(node.value)
+            case "symbol":
+                return self.variable(node.value)
+            case "add":
+                return args[0] + args[1]  # type: ignore[no-any-return]
+            case "sub":
+                return args[0] - args[1]  # type: ignore[no-any-return]
+            case "neg":
+                return -args[0]  # type: ignore[no-any-return]
+            case "mul":
+                return args[0] * args[1]  # type: ignore[no-any-return]
+            case "pow":
+                return self.power(args[0], node.value)
+        return self.function(node.op, args)
+
+    def values(self, roots: Sequence[Expression]) -> list[T]:
+        """The values of expressions; what they share is computed once."""
+        return fold(roots, self.visit)

@@ -1,0 +1,301 @@
+"""The elementary functions: everything phigen knows of each, in one record.
+
+Rules are callables of plain arithmetic. They take ``call``, which applies a function by its name, so that one rule
+serves expressions, sympy, numbers and elements of a ring alike.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from fractions import Fraction
+from typing import Any
+
+from phigen.symbolic import entire, special
+from phigen.symbolic.entire import ENTIRE
+from phigen.symbolic.special import SPECIAL
+
+HALF = Fraction(1, 2)
+
+#: Applies a function, given by its name, to arguments.
+Call = Callable[..., Any]
+
+
+def _everywhere(*arguments: Fraction) -> bool:
+    return True
+
+
+@dataclass(frozen=True)
+class Function:
+    """A function of an expression.
+
+    ``slopes(call, f, *arguments)`` are its partial derivatives, f its value; None if unknown. ``known(call,
+    *arguments)`` writes it by functions that readers know, ``value(library, *arguments)`` computes it with those of
+    `math` or of an mpmath context, which have one of its own name if there is no rule. ``at_zero`` is its value at 0,
+    if that is a rational number. ``defined`` tells whether it has a value at rational arguments, ``rational`` whether
+    its values are rational there. ``cost`` is in units of one addition. ``own`` are those of phigen's own, which no
+    spec can name.
+
+    ``written`` is how a language writes it: a name, or a text with ``{0}`` for the argument; in languages that are not
+    there a function of the generated file does it. ``lanes`` is the same for C's loops over lanes, by functions that
+    have a version for them, whose own entry is their name. ``letters`` is the name in mathematics.
+    """
+
+    name: str
+    arity: int = 1
+    own: bool = False
+    slopes: Callable[..., tuple[Any, ...]] | None = None
+    known: Callable[..., Any] | None = None
+    value: Callable[..., Any] | None = None
+    at_zero: Fraction | None = Fraction(0)
+    parity: str = ""
+    inverse: str = ""
+    defined: Callable[..., bool] = _everywhere
+    rational: bool = False
+    cost: int = 20
+    written: Mapping[str, str] = field(default_factory=dict)
+    lanes: str = ""
+    letters: str = ""
+
+
+def _languages(c: str, numpy: str, javascript: str) -> dict[str, str]:
+    return {"c": c, "numpy": numpy, "javascript": javascript}
+
+
+def _library(name: str, numpy: str = "") -> dict[str, str]:
+    """A function that the library of every language has."""
+    return _languages(name, f"np.{numpy or name}", f"Math.{name}")
+
+
+def _inverse(library: Any, a: Any) -> Any:
+    if a <= 0:
+        raise ValueError("inv of a value that is not positive")
+    return 1 / a
+
+
+_LISTED = (
+    Function(
+        "exp",
+        slopes=lambda call, f, a: (f,),
+        at_zero=Fraction(1),
+        inverse="log",
+        written=_library("exp"),
+        lanes="exp",
+    ),
+    Function(  # exp(a) − 1 without cancellation
+        "expm1",
+        own=True,
+        slopes=lambda call, f, a: (1 + f,),
+        known=lambda call, a: call("exp", a) - 1,
+        written=_library("expm1"),
+        lanes="expm1",
+    ),
+    Function(  # 1 − cos(a) without cancellation
+        "versin",
+        own=True,
+        slopes=lambda call, f, a: (call("sin", a),),
+        known=lambda call, a: 1 - call("cos", a),
+        value=lambda library, a: 2 * library.sin(a / 2) ** 2,
+        written=_languages(
+            "(2.0 * sin(0.5 * ({0})) * sin(0.5 * ({0})))",
+            "(2.0 * np.sin(0.5 * ({0})) ** 2)",
+            "(2.0 * Math.sin(0.5 * ({0})) ** 2)",
+        ),
+        lanes="(2.0 * {sin}(0.5 * ({{0}})) * {sin}(0.5 * ({{0}})))",
+    ),
+    Function(  # log(1 + a) without cancellation
+        "log1p",
+        own=True,
+        slopes=lambda call, f, a: (1 / (1 + a),),
+        known=lambda call, a: call("log", 1 + a),
+        written=_library("log1p"),
+    ),
+    Function(  # 1/a where a > 0, else not a number: beyond the pole of a flow there is no solution
+        "inv",
+        own=True,
+        slopes=lambda call, f, a: (-(f**2),),
+        known=lambda call, a: 1 / a,
+        value=_inverse,
+        at_zero=None,
+        cost=5,
+        written=_languages(
+            "({0} > 0.0 ? 1.0 / ({0}) : (double)NAN)",
+            "np.where({0} > 0.0, 1.0 / ({0}), np.nan)",
+            "({0} > 0.0 ? 1.0 / ({0}) : NaN)",
+        ),
+    ),
+    Function(
+        "log",
+        slopes=lambda call, f, a: (1 / a,),
+        at_zero=None,
+        inverse="exp",
+        defined=lambda a: a > 0,
+        written=_library("log"),
+        lanes="log",
+    ),
+    Function(
+        "sin",
+        slopes=lambda call, f, a: (call("cos", a),),
+        parity="odd",
+        written=_library("sin"),
+        lanes="sin",
+    ),
+    Function(
+        "cos",
+        slopes=lambda call, f, a: (-call("sin", a),),
+        at_zero=Fraction(1),
+        parity="even",
+        written=_library("cos"),
+        lanes="cos",
+    ),
+    Function("tan", slopes=lambda call, f, a: (1 + f**2,), parity="odd", written=_library("tan")),
+    Function(
+        "asin",
+        slopes=lambda call, f, a: ((1 - a**2) ** -HALF,),
+        parity="odd",
+        defined=lambda a: abs(a) <= 1,
+        written=_library("asin", "arcsin"),
+        letters="arcsin",
+    ),
+    Function(
+        "acos",
+        slopes=lambda call, f, a: (-((1 - a**2) ** -HALF),),
+        at_zero=None,
+        defined=lambda a: abs(a) <= 1,
+        written=_library("acos", "arccos"),
+        letters="arccos",
+    ),
+    Function(
+        "atan",
+        slopes=lambda call, f, a: (1 / (1 + a**2),),
+        parity="odd",
+        inverse="tan",
+        written=_library("atan", "arctan"),
+        letters="arctan",
+    ),
+    Function(
+        "atan2",
+        arity=2,
+        slopes=lambda call, f, a, b: (b * (radius := 1 / (a**2 + b**2)), -a * radius),
+        at_zero=None,
+        defined=lambda a, b: a != 0 or b != 0,
+        written=_library("atan2", "arctan2"),
+    ),
+    Function(
+        "sinh",
+        slopes=lambda call, f, a: (call("cosh", a),),
+        parity="odd",
+        inverse="asinh",
+        written=_library("sinh"),
+        lanes="(0.5 * ({expm1}({{0}}) - {expm1}(-({{0}}))))",
+    ),
+    Function(
+        "cosh",
+        slopes=lambda call, f, a: (call("sinh", a),),
+        at_zero=Fraction(1),
+        parity="even",
+        written=_library("cosh"),
+        lanes="(0.5 * ({exp}({{0}}) + {exp}(-({{0}}))))",
+    ),
+    Function(
+        "tanh",
+        slopes=lambda call, f, a: (1 - f**2,),
+        parity="odd",
+        inverse="atanh",
+        written=_library("tanh"),
+        lanes="({expm1}(2.0 * ({{0}})) / ({expm1}(2.0 * ({{0}})) + 2.0))",
+    ),
+    Function(
+        "asinh",
+        slopes=lambda call, f, a: ((1 + a**2) ** -HALF,),
+        parity="odd",
+        inverse="sinh",
+        written=_library("asinh", "arcsinh"),
+        letters="arsinh",
+    ),
+    Function(
+        "acosh",
+        slopes=lambda call, f, a: ((a**2 - 1) ** -HALF,),
+        at_zero=None,
+        defined=lambda a: a >= 1,
+        written=_library("acosh", "arccosh"),
+        letters="arcosh",
+    ),
+    Function(
+        "atanh",
+        slopes=lambda call, f, a: (1 / (1 - a**2),),
+        parity="odd",
+        defined=lambda a: abs(a) < 1,
+        written=_library("atanh", "arctanh"),
+        letters="artanh",
+    ),
+    Function(
+        "abs",
+        slopes=lambda call, f, a: (call("sign", a),),
+        value=lambda library, a: abs(a),
+        rational=True,
+        written=_languages("fabs", "np.abs", "Math.abs"),
+    ),
+    Function(  # made by differentiating abs
+        "sign",
+        own=True,
+        slopes=lambda call, f, a: (0,),
+        value=lambda library, a: (a > 0) - (a < 0),
+        rational=True,
+        parity="odd",
+        written=_languages("(double)(({0} > 0.0) - ({0} < 0.0))", "np.sign", "Math.sign"),
+        letters="sgn",
+    ),
+    Function(  # base**exponent with an exponent that is not a rational number
+        "power",
+        arity=2,
+        own=True,
+        slopes=lambda call, f, a, b: (f * b / a, f * call("log", a)),
+        at_zero=None,
+        written=_languages("pow", "np.power", "Math.pow"),
+    ),
+)
+
+
+def _phi(order: int) -> Function:
+    """The derivative of φ of that order (`phigen.symbolic.special`), near 0 a series of nine terms, and a test."""
+    name, further = SPECIAL[order], SPECIAL[order + 1 : order + 2]
+    return Function(
+        name,
+        own=True,
+        slopes=(lambda call, f, s: (call(*further, s),)) if further else None,
+        value=lambda library, s: special.value(library, order, s),
+        at_zero=special.coefficient(order, 0),
+        cost=18,
+        lanes=name,
+        letters=("φ", "φ′", "φ″")[order],
+    )
+
+
+def _entire(name: str) -> Function:
+    """A function of `phigen.symbolic.entire`, near 0 a series."""
+    given = ENTIRE[name]
+    return Function(
+        name,
+        own=True,
+        slopes=given.slopes,
+        known=given.known,
+        value=lambda library, s: entire.value(library, name, s),
+        at_zero=given.coefficient(0),
+        cost=18,
+    )
+
+
+#: All of them by name, in the order in which files define and lists show them.
+FUNCTIONS: dict[str, Function] = {f.name: f for f in _LISTED}
+FUNCTIONS |= {name: _phi(order) for order, name in enumerate(SPECIAL)}
+FUNCTIONS |= {name: _entire(name) for name in ENTIRE}
+
+#: Powers with exponents ½ and ⅓: expressions have no such functions, languages do.
+ROOTS = {"sqrt": _library("sqrt"), "cbrt": _library("cbrt")}
+
+
+def written_in(language: str) -> dict[str, str]:
+    """How a language writes functions, roots among them; those that a generated file defines are not there."""
+    listed = {f.name: f.written[language] for f in FUNCTIONS.values() if language in f.written}
+    return listed | {name: forms[language] for name, forms in ROOTS.items()}
