@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: f862c654e593b2c5514331b3a349945bc941f03510965fdb1cd38fa834d5cd3b
+ * body-sha256: b77bcc5e56e98fae1d681742f833b0173c6a6e792cca19867aaa36e71f8d3a74
  */
 #include "ablowitz_ladik3.h"
 
@@ -503,11 +503,11 @@ static int ablowitz_ladik3_piece(const double *coef, const double p[6], const do
 }
 
 /* The whole path from x, in 1, 2, 4, ... pieces until each expansion converges. Whatever p is, the end of the path
-   lies on the symplectic leaf of x. 0 if the path is too long or leaves the domain. */
+   lies on the symplectic leaf of x. 0 if the path is too long or leaves the domain. *made counts all pieces. */
 static int ablowitz_ladik3_path(const double *coef, const double x[6], const double p[6], double change[6],
-    double mean[6])
+    double mean[6], int *made)
 {
-    for (int pieces = 1; pieces <= 512; pieces *= 2) {
+    for (int pieces = 1; pieces <= 128; pieces *= 2) {
         double q[6], point[6], shift[6], local[6];
         int good = 1;
         for (int i = 0; i < 6; ++i) {
@@ -517,6 +517,7 @@ static int ablowitz_ladik3_path(const double *coef, const double x[6], const dou
         for (int piece = 0; piece < pieces && good; ++piece) {
             for (int i = 0; i < 6; ++i) point[i] = x[i] + change[i];
             good = ablowitz_ladik3_piece(coef, q, point, shift, local);
+            ++*made;
             for (int i = 0; i < 6; ++i) {
                 mean[i] += (change[i] + local[i]) / pieces;
                 change[i] += shift[i];
@@ -530,10 +531,11 @@ static int ablowitz_ladik3_path(const double *coef, const double x[6], const dou
 /* The residual p - grad S_h(mean of the path) of the equation for p, with that mean y, the path's change of
    x and an approximate Jacobian of the residual. 0 if the path cannot be followed. */
 static int ablowitz_ladik3_residual(ablowitz_ladik3_solver *s, const double *coef, const double p[6], double y[6],
-    double residual[6], double change[6], double jacobian[36])
+    double residual[6], double change[6], double jacobian[36],
+    int *made)
 {
     double mean[6];
-    if (!ablowitz_ladik3_path(coef, s->x, p, change, mean)) return 0;
+    if (!ablowitz_ladik3_path(coef, s->x, p, change, mean, made)) return 0;
     for (int i = 0; i < 6; ++i) y[i] = s->x[i] + mean[i];
     ablowitz_ladik3_generate(coef, y, residual, jacobian);
     for (int i = 0; i < 6; ++i) residual[i] = p[i] - residual[i];
@@ -543,20 +545,21 @@ static int ablowitz_ladik3_residual(ablowitz_ladik3_solver *s, const double *coe
 
 /* The Jacobian by differences, for steps so large that the approximate one does not contract. */
 static int ablowitz_ladik3_differences(ablowitz_ladik3_solver *s, const double *coef, const double p[6],
-    const double residual[6], double jacobian[36])
+    const double residual[6], double jacobian[36], int *made)
 {
     double q[6], y[6], moved[6], change[6], unused[36], norm = DBL_MIN;
     for (int i = 0; i < 6; ++i) norm = fabs(p[i]) > norm ? fabs(p[i]) : norm;
     for (int j = 0; j < 6; ++j) {
         memcpy(q, p, sizeof q);
         q[j] += 1e-7 * norm;
-        if (!ablowitz_ladik3_residual(s, coef, q, y, moved, change, unused)) return 0;
+        if (!ablowitz_ladik3_residual(s, coef, q, y, moved, change, unused, made)) return 0;
         for (int i = 0; i < 6; ++i) jacobian[i * 6 + j] = (moved[i] - residual[i]) / (q[j] - p[j]);
     }
     return 1;
 }
 
-/* Solve p = grad S_h(mean of the path from x under p) and move to the end of that path. */
+/* Solve p = grad S_h(mean of the path from x under p) and move to the end of that path. Where that takes more than
+   512 pieces of paths, the step is so large that a solution would mean nothing. */
 static ablowitz_ladik3_status ablowitz_ladik3_attempt(ablowitz_ladik3_solver *s, int stage)
 {
     const double *coef = s->coef[stage], none[6] = { 0.0 };
@@ -564,8 +567,8 @@ static ablowitz_ladik3_status ablowitz_ladik3_attempt(ablowitz_ladik3_solver *s,
     double p[6], y[6], residual[6], change[6], jacobian[36], previous = HUGE_VAL;
     if (!ablowitz_ladik3_predict(memory, y)) memcpy(y, s->x, sizeof y);
     ablowitz_ladik3_generate(coef, y, p, jacobian);
-    for (int iteration = 0; iteration < 20; ++iteration) {
-        if (!ablowitz_ladik3_residual(s, coef, p, y, residual, change, jacobian)) return ablowitz_ladik3_NO_CONVERGENCE;
+    for (int iteration = 0, made = 0; iteration < 20 && made <= 512; ++iteration) {
+        if (!ablowitz_ladik3_residual(s, coef, p, y, residual, change, jacobian, &made)) return ablowitz_ladik3_NO_CONVERGENCE;
         double size = 0.0, norm = DBL_MIN;
         for (int i = 0; i < 6; ++i) {
             if (!isfinite(residual[i])) return ablowitz_ladik3_NOT_FINITE;
@@ -580,8 +583,8 @@ static ablowitz_ladik3_status ablowitz_ladik3_attempt(ablowitz_ladik3_solver *s,
             ablowitz_ladik3_remember(memory, y, iteration);
             return ablowitz_ladik3_OK;
         }
-        if (iteration >= 3 && size > 0.05 * previous && !ablowitz_ladik3_differences(s, coef, p, residual, jacobian))
-            return ablowitz_ladik3_NO_CONVERGENCE;
+        const int slow = iteration >= 3 && size > 0.05 * previous;
+        if (slow && !ablowitz_ladik3_differences(s, coef, p, residual, jacobian, &made)) return ablowitz_ladik3_NO_CONVERGENCE;
         if (!ablowitz_ladik3_solve(jacobian, residual)) return ablowitz_ladik3_SINGULAR;
         for (int i = 0; i < 6; ++i) p[i] -= residual[i];
         previous = size;

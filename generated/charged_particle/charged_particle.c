@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 27b182361eb48818737c325ac12567d81791d5a091199014e9352c1fcbc2fa47
+ * body-sha256: f7247cec73bbd4a23001f6137c6a651eb503e5782d1c8855c5e193079025b7d7
  */
 #include "charged_particle.h"
 
@@ -497,11 +497,11 @@ static int charged_particle_piece(const double *coef, const double p[6], const d
 }
 
 /* The whole path from x, in 1, 2, 4, ... pieces until each expansion converges. Whatever p is, the end of the path
-   lies on the symplectic leaf of x. 0 if the path is too long or leaves the domain. */
+   lies on the symplectic leaf of x. 0 if the path is too long or leaves the domain. *made counts all pieces. */
 static int charged_particle_path(const double *coef, const double x[6], const double p[6], double change[6],
-    double mean[6])
+    double mean[6], int *made)
 {
-    for (int pieces = 1; pieces <= 512; pieces *= 2) {
+    for (int pieces = 1; pieces <= 128; pieces *= 2) {
         double q[6], point[6], shift[6], local[6];
         int good = 1;
         for (int i = 0; i < 6; ++i) {
@@ -511,6 +511,7 @@ static int charged_particle_path(const double *coef, const double x[6], const do
         for (int piece = 0; piece < pieces && good; ++piece) {
             for (int i = 0; i < 6; ++i) point[i] = x[i] + change[i];
             good = charged_particle_piece(coef, q, point, shift, local);
+            ++*made;
             for (int i = 0; i < 6; ++i) {
                 mean[i] += (change[i] + local[i]) / pieces;
                 change[i] += shift[i];
@@ -524,10 +525,11 @@ static int charged_particle_path(const double *coef, const double x[6], const do
 /* The residual p - grad S_h(mean of the path) of the equation for p, with that mean y, the path's change of
    x and an approximate Jacobian of the residual. 0 if the path cannot be followed. */
 static int charged_particle_residual(charged_particle_solver *s, const double *coef, const double p[6], double y[6],
-    double residual[6], double change[6], double jacobian[36])
+    double residual[6], double change[6], double jacobian[36],
+    int *made)
 {
     double mean[6];
-    if (!charged_particle_path(coef, s->x, p, change, mean)) return 0;
+    if (!charged_particle_path(coef, s->x, p, change, mean, made)) return 0;
     for (int i = 0; i < 6; ++i) y[i] = s->x[i] + mean[i];
     charged_particle_generate(coef, y, residual, jacobian);
     for (int i = 0; i < 6; ++i) residual[i] = p[i] - residual[i];
@@ -537,20 +539,21 @@ static int charged_particle_residual(charged_particle_solver *s, const double *c
 
 /* The Jacobian by differences, for steps so large that the approximate one does not contract. */
 static int charged_particle_differences(charged_particle_solver *s, const double *coef, const double p[6],
-    const double residual[6], double jacobian[36])
+    const double residual[6], double jacobian[36], int *made)
 {
     double q[6], y[6], moved[6], change[6], unused[36], norm = DBL_MIN;
     for (int i = 0; i < 6; ++i) norm = fabs(p[i]) > norm ? fabs(p[i]) : norm;
     for (int j = 0; j < 6; ++j) {
         memcpy(q, p, sizeof q);
         q[j] += 1e-7 * norm;
-        if (!charged_particle_residual(s, coef, q, y, moved, change, unused)) return 0;
+        if (!charged_particle_residual(s, coef, q, y, moved, change, unused, made)) return 0;
         for (int i = 0; i < 6; ++i) jacobian[i * 6 + j] = (moved[i] - residual[i]) / (q[j] - p[j]);
     }
     return 1;
 }
 
-/* Solve p = grad S_h(mean of the path from x under p) and move to the end of that path. */
+/* Solve p = grad S_h(mean of the path from x under p) and move to the end of that path. Where that takes more than
+   512 pieces of paths, the step is so large that a solution would mean nothing. */
 static charged_particle_status charged_particle_attempt(charged_particle_solver *s, int stage)
 {
     const double *coef = s->coef[stage], none[6] = { 0.0 };
@@ -558,8 +561,8 @@ static charged_particle_status charged_particle_attempt(charged_particle_solver 
     double p[6], y[6], residual[6], change[6], jacobian[36], previous = HUGE_VAL;
     if (!charged_particle_predict(memory, y)) memcpy(y, s->x, sizeof y);
     charged_particle_generate(coef, y, p, jacobian);
-    for (int iteration = 0; iteration < 20; ++iteration) {
-        if (!charged_particle_residual(s, coef, p, y, residual, change, jacobian)) return charged_particle_NO_CONVERGENCE;
+    for (int iteration = 0, made = 0; iteration < 20 && made <= 512; ++iteration) {
+        if (!charged_particle_residual(s, coef, p, y, residual, change, jacobian, &made)) return charged_particle_NO_CONVERGENCE;
         double size = 0.0, norm = DBL_MIN;
         for (int i = 0; i < 6; ++i) {
             if (!isfinite(residual[i])) return charged_particle_NOT_FINITE;
@@ -574,8 +577,8 @@ static charged_particle_status charged_particle_attempt(charged_particle_solver 
             charged_particle_remember(memory, y, iteration);
             return charged_particle_OK;
         }
-        if (iteration >= 3 && size > 0.05 * previous && !charged_particle_differences(s, coef, p, residual, jacobian))
-            return charged_particle_NO_CONVERGENCE;
+        const int slow = iteration >= 3 && size > 0.05 * previous;
+        if (slow && !charged_particle_differences(s, coef, p, residual, jacobian, &made)) return charged_particle_NO_CONVERGENCE;
         if (!charged_particle_solve(jacobian, residual)) return charged_particle_SINGULAR;
         for (int i = 0; i < 6; ++i) p[i] -= residual[i];
         previous = size;

@@ -12,7 +12,7 @@
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 60cfac1798bf33e4e74e0bd21616083d4af3775387166be07af783526bfb228a
+# body-sha256: d289c9f59fbb6ab2d10ba4e6e1627cc530f46aabc3d9ac72a17145ec46633980
 import numpy as np
 
 VERSION = "0.1.0"
@@ -309,16 +309,20 @@ def _piece(coef, p, start):
 
 
 def _path(coef, x, p):
-    """The whole path in 1, 2, 4, ... pieces until each expansion converges: change of x, mean of m - x, success."""
-    change, mean = np.full_like(x, np.nan), np.full_like(x, np.nan)
+    """The whole path in 1, 2, 4, ... pieces until each expansion converges: change of x, mean of m - x, pieces made.
+
+    NaN where the path is too long or leaves the domain.
+    """
+    change, mean, made = np.full_like(x, np.nan), np.full_like(x, np.nan), np.zeros(len(x), dtype=int)
     left = np.arange(len(x))
-    for pieces in (1, 2, 4, 8, 16, 32, 64, 128, 256, 512):
+    for pieces in (1, 2, 4, 8, 16, 32, 64, 128):
         total, average = np.zeros((len(left), DIM)), np.zeros((len(left), DIM))
         good = np.full(len(left), True)
         for _ in range(pieces):
             shift, local, fine = _piece(_at(coef, left), p[left] / pieces, x[left] + total)
             average += (total + local) / pieces
             total += shift
+            made[left[good]] += 1
             good &= fine
             if not good.any():
                 break
@@ -326,25 +330,28 @@ def _path(coef, x, p):
         left = left[~good]
         if not len(left):
             break
-    return change, mean
+    return change, mean, made
 
 
 def _residual(coef, x, p):
-    """p - grad S_h(mean of the path from x under p), the path's change of x, and an approximate Jacobian."""
-    change, mean = _path(coef, x, p)
+    """p - grad S_h(mean of the path from x under p), the path's change of x, an approximate Jacobian, pieces made."""
+    change, mean, made = _path(coef, x, p)
     slope, jacobian = _generate(coef, x + mean)
-    return p - slope, change, jacobian
+    return p - slope, change, jacobian, made
 
 
 def _differences(coef, x, p, residual):
-    """The Jacobian by differences, for steps so large that the approximate one does not contract."""
+    """The Jacobian by differences, for steps so large that the approximate one does not contract; pieces made."""
+    made = np.zeros(len(x), dtype=int)
     norm = np.max(np.abs(p), axis=-1) + np.finfo(float).tiny
     columns = []
     for j in range(DIM):
         q = p.copy()
         q[:, j] += 1e-7 * norm
-        columns.append((_residual(coef, x, q)[0] - residual) / (q[:, j] - p[:, j])[:, np.newaxis])
-    return np.stack(columns, axis=-1)
+        shifted, _, _, pieces = _residual(coef, x, q)
+        columns.append((shifted - residual) / (q[:, j] - p[:, j])[:, np.newaxis])
+        made += pieces
+    return np.stack(columns, axis=-1), made
 
 
 def _solve(matrix, side):
@@ -384,14 +391,16 @@ def _solved(stage, x, carry, guess):
 def _attempt(coef, x, carry, p):
     """Solve p = grad S_h(mean of the path from x under p), and move to the end of that path; arrays (members, DIM).
 
+    Where that takes more than 512 pieces of paths, the step is so large that a solution would mean nothing.
     Returns new x, carry, p, and a status for each member, "" if good.
     """
     x, carry, p = x.copy(), carry.copy(), p.copy()
     status = np.full(len(x), "NO_CONVERGENCE", dtype=object)
     previous = np.full(len(x), np.inf)
-    open_ = np.arange(len(x))
+    open_, made = np.arange(len(x)), np.zeros(len(x), dtype=int)
     for iteration in range(20):
-        residual, change, jacobian = _residual(_at(coef, open_), x[open_], p[open_])
+        residual, change, jacobian, pieces = _residual(_at(coef, open_), x[open_], p[open_])
+        made[open_] += pieces
         norm = np.max(np.abs(p[open_]), axis=-1) + np.finfo(float).tiny
         size = np.max(np.abs(residual), axis=-1) / norm
         finite = np.isfinite(residual).all(axis=-1)
@@ -405,14 +414,15 @@ def _attempt(coef, x, carry, p):
         slow = np.flatnonzero(finite & ~done & (iteration >= 3) & (size > 0.05 * previous[open_]))
         if len(slow):
             at = open_[slow]
-            jacobian[slow] = _differences(_at(coef, at), x[at], p[at], residual[slow])
+            jacobian[slow], pieces = _differences(_at(coef, at), x[at], p[at], residual[slow])
+            made[at] += pieces
         delta = _solve(jacobian, residual)
         singular = finite & ~done & ~np.isfinite(delta).all(axis=-1)
         status[open_[singular]] = "SINGULAR"
         step = ~done & finite & ~singular
         p[open_[step]] -= delta[step]
         previous[open_] = size
-        open_ = open_[step]
+        open_ = open_[step & (made[open_] <= 512)]
         if not len(open_):
             break
     return x, carry, p, status

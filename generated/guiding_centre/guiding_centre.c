@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: c7134e10cb05dc3d1ecd0e387df401f0ad0473f44f24674e172a1434ab9d7787
+ * body-sha256: bbd486e0b43b5d6c4aefd13a310650a4db35db933d53a3b797dbe052036b3c6c
  */
 #include "guiding_centre.h"
 
@@ -613,11 +613,11 @@ static int guiding_centre_piece(const double *coef, const double p[4], const dou
 }
 
 /* The whole path from x, in 1, 2, 4, ... pieces until each expansion converges. Whatever p is, the end of the path
-   lies on the symplectic leaf of x. 0 if the path is too long or leaves the domain. */
+   lies on the symplectic leaf of x. 0 if the path is too long or leaves the domain. *made counts all pieces. */
 static int guiding_centre_path(const double *coef, const double x[4], const double p[4], double change[4],
-    double mean[4])
+    double mean[4], int *made)
 {
-    for (int pieces = 1; pieces <= 512; pieces *= 2) {
+    for (int pieces = 1; pieces <= 128; pieces *= 2) {
         double q[4], point[4], shift[4], local[4];
         int good = 1;
         for (int i = 0; i < 4; ++i) {
@@ -627,6 +627,7 @@ static int guiding_centre_path(const double *coef, const double x[4], const doub
         for (int piece = 0; piece < pieces && good; ++piece) {
             for (int i = 0; i < 4; ++i) point[i] = x[i] + change[i];
             good = guiding_centre_piece(coef, q, point, shift, local);
+            ++*made;
             for (int i = 0; i < 4; ++i) {
                 mean[i] += (change[i] + local[i]) / pieces;
                 change[i] += shift[i];
@@ -640,10 +641,11 @@ static int guiding_centre_path(const double *coef, const double x[4], const doub
 /* The residual p - grad S_h(mean of the path) of the equation for p, with that mean y, the path's change of
    x and an approximate Jacobian of the residual. 0 if the path cannot be followed. */
 static int guiding_centre_residual(guiding_centre_solver *s, const double *coef, const double p[4], double y[4],
-    double residual[4], double change[4], double jacobian[16])
+    double residual[4], double change[4], double jacobian[16],
+    int *made)
 {
     double mean[4];
-    if (!guiding_centre_path(coef, s->x, p, change, mean)) return 0;
+    if (!guiding_centre_path(coef, s->x, p, change, mean, made)) return 0;
     for (int i = 0; i < 4; ++i) y[i] = s->x[i] + mean[i];
     guiding_centre_generate(coef, y, residual, jacobian);
     for (int i = 0; i < 4; ++i) residual[i] = p[i] - residual[i];
@@ -653,20 +655,21 @@ static int guiding_centre_residual(guiding_centre_solver *s, const double *coef,
 
 /* The Jacobian by differences, for steps so large that the approximate one does not contract. */
 static int guiding_centre_differences(guiding_centre_solver *s, const double *coef, const double p[4],
-    const double residual[4], double jacobian[16])
+    const double residual[4], double jacobian[16], int *made)
 {
     double q[4], y[4], moved[4], change[4], unused[16], norm = DBL_MIN;
     for (int i = 0; i < 4; ++i) norm = fabs(p[i]) > norm ? fabs(p[i]) : norm;
     for (int j = 0; j < 4; ++j) {
         memcpy(q, p, sizeof q);
         q[j] += 1e-7 * norm;
-        if (!guiding_centre_residual(s, coef, q, y, moved, change, unused)) return 0;
+        if (!guiding_centre_residual(s, coef, q, y, moved, change, unused, made)) return 0;
         for (int i = 0; i < 4; ++i) jacobian[i * 4 + j] = (moved[i] - residual[i]) / (q[j] - p[j]);
     }
     return 1;
 }
 
-/* Solve p = grad S_h(mean of the path from x under p) and move to the end of that path. */
+/* Solve p = grad S_h(mean of the path from x under p) and move to the end of that path. Where that takes more than
+   512 pieces of paths, the step is so large that a solution would mean nothing. */
 static guiding_centre_status guiding_centre_attempt(guiding_centre_solver *s, int stage)
 {
     const double *coef = s->coef[stage], none[4] = { 0.0 };
@@ -674,8 +677,8 @@ static guiding_centre_status guiding_centre_attempt(guiding_centre_solver *s, in
     double p[4], y[4], residual[4], change[4], jacobian[16], previous = HUGE_VAL;
     if (!guiding_centre_predict(memory, y)) memcpy(y, s->x, sizeof y);
     guiding_centre_generate(coef, y, p, jacobian);
-    for (int iteration = 0; iteration < 20; ++iteration) {
-        if (!guiding_centre_residual(s, coef, p, y, residual, change, jacobian)) return guiding_centre_NO_CONVERGENCE;
+    for (int iteration = 0, made = 0; iteration < 20 && made <= 512; ++iteration) {
+        if (!guiding_centre_residual(s, coef, p, y, residual, change, jacobian, &made)) return guiding_centre_NO_CONVERGENCE;
         double size = 0.0, norm = DBL_MIN;
         for (int i = 0; i < 4; ++i) {
             if (!isfinite(residual[i])) return guiding_centre_NOT_FINITE;
@@ -690,8 +693,8 @@ static guiding_centre_status guiding_centre_attempt(guiding_centre_solver *s, in
             guiding_centre_remember(memory, y, iteration);
             return guiding_centre_OK;
         }
-        if (iteration >= 3 && size > 0.05 * previous && !guiding_centre_differences(s, coef, p, residual, jacobian))
-            return guiding_centre_NO_CONVERGENCE;
+        const int slow = iteration >= 3 && size > 0.05 * previous;
+        if (slow && !guiding_centre_differences(s, coef, p, residual, jacobian, &made)) return guiding_centre_NO_CONVERGENCE;
         if (!guiding_centre_solve(jacobian, residual)) return guiding_centre_SINGULAR;
         for (int i = 0; i < 4; ++i) p[i] -= residual[i];
         previous = size;

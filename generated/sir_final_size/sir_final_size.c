@@ -12,7 +12,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: f8fa832931543fc3687d1349298714dc554189f9f37e10955300d5d7f909a553
+ * body-sha256: 36686d1b2fec3a22d2e158adf21ba4be98c8b5f88e327437ad2bd8003ba070e3
  */
 #include "sir_final_size.h"
 
@@ -429,11 +429,11 @@ static int sir_final_size_piece(const double *coef, const double p[3], const dou
 }
 
 /* The whole path from x, in 1, 2, 4, ... pieces until each expansion converges. Whatever p is, the end of the path
-   lies on the symplectic leaf of x. 0 if the path is too long or leaves the domain. */
+   lies on the symplectic leaf of x. 0 if the path is too long or leaves the domain. *made counts all pieces. */
 static int sir_final_size_path(const double *coef, const double x[3], const double p[3], double change[3],
-    double mean[3])
+    double mean[3], int *made)
 {
-    for (int pieces = 1; pieces <= 512; pieces *= 2) {
+    for (int pieces = 1; pieces <= 128; pieces *= 2) {
         double q[3], point[3], shift[3], local[3];
         int good = 1;
         for (int i = 0; i < 3; ++i) {
@@ -443,6 +443,7 @@ static int sir_final_size_path(const double *coef, const double x[3], const doub
         for (int piece = 0; piece < pieces && good; ++piece) {
             for (int i = 0; i < 3; ++i) point[i] = x[i] + change[i];
             good = sir_final_size_piece(coef, q, point, shift, local);
+            ++*made;
             for (int i = 0; i < 3; ++i) {
                 mean[i] += (change[i] + local[i]) / pieces;
                 change[i] += shift[i];
@@ -456,10 +457,11 @@ static int sir_final_size_path(const double *coef, const double x[3], const doub
 /* The residual p - grad S_h(mean of the path) of the equation for p, with that mean y, the path's change of
    x and an approximate Jacobian of the residual. 0 if the path cannot be followed. */
 static int sir_final_size_residual(sir_final_size_solver *s, const double *coef, const double p[3], double y[3],
-    double residual[3], double change[3], double jacobian[9])
+    double residual[3], double change[3], double jacobian[9],
+    int *made)
 {
     double mean[3];
-    if (!sir_final_size_path(coef, s->x, p, change, mean)) return 0;
+    if (!sir_final_size_path(coef, s->x, p, change, mean, made)) return 0;
     for (int i = 0; i < 3; ++i) y[i] = s->x[i] + mean[i];
     sir_final_size_generate(coef, y, residual, jacobian);
     for (int i = 0; i < 3; ++i) residual[i] = p[i] - residual[i];
@@ -469,20 +471,21 @@ static int sir_final_size_residual(sir_final_size_solver *s, const double *coef,
 
 /* The Jacobian by differences, for steps so large that the approximate one does not contract. */
 static int sir_final_size_differences(sir_final_size_solver *s, const double *coef, const double p[3],
-    const double residual[3], double jacobian[9])
+    const double residual[3], double jacobian[9], int *made)
 {
     double q[3], y[3], moved[3], change[3], unused[9], norm = DBL_MIN;
     for (int i = 0; i < 3; ++i) norm = fabs(p[i]) > norm ? fabs(p[i]) : norm;
     for (int j = 0; j < 3; ++j) {
         memcpy(q, p, sizeof q);
         q[j] += 1e-7 * norm;
-        if (!sir_final_size_residual(s, coef, q, y, moved, change, unused)) return 0;
+        if (!sir_final_size_residual(s, coef, q, y, moved, change, unused, made)) return 0;
         for (int i = 0; i < 3; ++i) jacobian[i * 3 + j] = (moved[i] - residual[i]) / (q[j] - p[j]);
     }
     return 1;
 }
 
-/* Solve p = grad S_h(mean of the path from x under p) and move to the end of that path. */
+/* Solve p = grad S_h(mean of the path from x under p) and move to the end of that path. Where that takes more than
+   512 pieces of paths, the step is so large that a solution would mean nothing. */
 static sir_final_size_status sir_final_size_attempt(sir_final_size_solver *s, int stage)
 {
     const double *coef = s->coef[stage], none[3] = { 0.0 };
@@ -490,8 +493,8 @@ static sir_final_size_status sir_final_size_attempt(sir_final_size_solver *s, in
     double p[3], y[3], residual[3], change[3], jacobian[9], previous = HUGE_VAL;
     if (!sir_final_size_predict(memory, y)) memcpy(y, s->x, sizeof y);
     sir_final_size_generate(coef, y, p, jacobian);
-    for (int iteration = 0; iteration < 20; ++iteration) {
-        if (!sir_final_size_residual(s, coef, p, y, residual, change, jacobian)) return sir_final_size_NO_CONVERGENCE;
+    for (int iteration = 0, made = 0; iteration < 20 && made <= 512; ++iteration) {
+        if (!sir_final_size_residual(s, coef, p, y, residual, change, jacobian, &made)) return sir_final_size_NO_CONVERGENCE;
         double size = 0.0, norm = DBL_MIN;
         for (int i = 0; i < 3; ++i) {
             if (!isfinite(residual[i])) return sir_final_size_NOT_FINITE;
@@ -506,8 +509,8 @@ static sir_final_size_status sir_final_size_attempt(sir_final_size_solver *s, in
             sir_final_size_remember(memory, y, iteration);
             return sir_final_size_OK;
         }
-        if (iteration >= 3 && size > 0.05 * previous && !sir_final_size_differences(s, coef, p, residual, jacobian))
-            return sir_final_size_NO_CONVERGENCE;
+        const int slow = iteration >= 3 && size > 0.05 * previous;
+        if (slow && !sir_final_size_differences(s, coef, p, residual, jacobian, &made)) return sir_final_size_NO_CONVERGENCE;
         if (!sir_final_size_solve(jacobian, residual)) return sir_final_size_SINGULAR;
         for (int i = 0; i < 3; ++i) p[i] -= residual[i];
         previous = size;

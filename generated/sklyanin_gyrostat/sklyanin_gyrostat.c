@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: f23e8bd16203e55749c73697ac117678d96ad16248da97c00f02052690ac87eb
+ * body-sha256: f3ab4e3e9861c355b675f7db0314cf0c43c340c56d522e319fcd834b573bb228
  */
 #include "sklyanin_gyrostat.h"
 
@@ -612,11 +612,11 @@ static int sklyanin_gyrostat_piece(const double *coef, const double p[4], const 
 }
 
 /* The whole path from x, in 1, 2, 4, ... pieces until each expansion converges. Whatever p is, the end of the path
-   lies on the symplectic leaf of x. 0 if the path is too long or leaves the domain. */
+   lies on the symplectic leaf of x. 0 if the path is too long or leaves the domain. *made counts all pieces. */
 static int sklyanin_gyrostat_path(const double *coef, const double x[4], const double p[4], double change[4],
-    double mean[4])
+    double mean[4], int *made)
 {
-    for (int pieces = 1; pieces <= 512; pieces *= 2) {
+    for (int pieces = 1; pieces <= 128; pieces *= 2) {
         double q[4], point[4], shift[4], local[4];
         int good = 1;
         for (int i = 0; i < 4; ++i) {
@@ -626,6 +626,7 @@ static int sklyanin_gyrostat_path(const double *coef, const double x[4], const d
         for (int piece = 0; piece < pieces && good; ++piece) {
             for (int i = 0; i < 4; ++i) point[i] = x[i] + change[i];
             good = sklyanin_gyrostat_piece(coef, q, point, shift, local);
+            ++*made;
             for (int i = 0; i < 4; ++i) {
                 mean[i] += (change[i] + local[i]) / pieces;
                 change[i] += shift[i];
@@ -639,10 +640,11 @@ static int sklyanin_gyrostat_path(const double *coef, const double x[4], const d
 /* The residual p - grad S_h(mean of the path) of the equation for p, with that mean y, the path's change of
    x and an approximate Jacobian of the residual. 0 if the path cannot be followed. */
 static int sklyanin_gyrostat_residual(sklyanin_gyrostat_solver *s, const double *coef, const double p[4], double y[4],
-    double residual[4], double change[4], double jacobian[16])
+    double residual[4], double change[4], double jacobian[16],
+    int *made)
 {
     double mean[4];
-    if (!sklyanin_gyrostat_path(coef, s->x, p, change, mean)) return 0;
+    if (!sklyanin_gyrostat_path(coef, s->x, p, change, mean, made)) return 0;
     for (int i = 0; i < 4; ++i) y[i] = s->x[i] + mean[i];
     sklyanin_gyrostat_generate(coef, y, residual, jacobian);
     for (int i = 0; i < 4; ++i) residual[i] = p[i] - residual[i];
@@ -652,20 +654,21 @@ static int sklyanin_gyrostat_residual(sklyanin_gyrostat_solver *s, const double 
 
 /* The Jacobian by differences, for steps so large that the approximate one does not contract. */
 static int sklyanin_gyrostat_differences(sklyanin_gyrostat_solver *s, const double *coef, const double p[4],
-    const double residual[4], double jacobian[16])
+    const double residual[4], double jacobian[16], int *made)
 {
     double q[4], y[4], moved[4], change[4], unused[16], norm = DBL_MIN;
     for (int i = 0; i < 4; ++i) norm = fabs(p[i]) > norm ? fabs(p[i]) : norm;
     for (int j = 0; j < 4; ++j) {
         memcpy(q, p, sizeof q);
         q[j] += 1e-7 * norm;
-        if (!sklyanin_gyrostat_residual(s, coef, q, y, moved, change, unused)) return 0;
+        if (!sklyanin_gyrostat_residual(s, coef, q, y, moved, change, unused, made)) return 0;
         for (int i = 0; i < 4; ++i) jacobian[i * 4 + j] = (moved[i] - residual[i]) / (q[j] - p[j]);
     }
     return 1;
 }
 
-/* Solve p = grad S_h(mean of the path from x under p) and move to the end of that path. */
+/* Solve p = grad S_h(mean of the path from x under p) and move to the end of that path. Where that takes more than
+   512 pieces of paths, the step is so large that a solution would mean nothing. */
 static sklyanin_gyrostat_status sklyanin_gyrostat_attempt(sklyanin_gyrostat_solver *s, int stage)
 {
     const double *coef = s->coef[stage], none[4] = { 0.0 };
@@ -673,8 +676,8 @@ static sklyanin_gyrostat_status sklyanin_gyrostat_attempt(sklyanin_gyrostat_solv
     double p[4], y[4], residual[4], change[4], jacobian[16], previous = HUGE_VAL;
     if (!sklyanin_gyrostat_predict(memory, y)) memcpy(y, s->x, sizeof y);
     sklyanin_gyrostat_generate(coef, y, p, jacobian);
-    for (int iteration = 0; iteration < 20; ++iteration) {
-        if (!sklyanin_gyrostat_residual(s, coef, p, y, residual, change, jacobian)) return sklyanin_gyrostat_NO_CONVERGENCE;
+    for (int iteration = 0, made = 0; iteration < 20 && made <= 512; ++iteration) {
+        if (!sklyanin_gyrostat_residual(s, coef, p, y, residual, change, jacobian, &made)) return sklyanin_gyrostat_NO_CONVERGENCE;
         double size = 0.0, norm = DBL_MIN;
         for (int i = 0; i < 4; ++i) {
             if (!isfinite(residual[i])) return sklyanin_gyrostat_NOT_FINITE;
@@ -689,8 +692,8 @@ static sklyanin_gyrostat_status sklyanin_gyrostat_attempt(sklyanin_gyrostat_solv
             sklyanin_gyrostat_remember(memory, y, iteration);
             return sklyanin_gyrostat_OK;
         }
-        if (iteration >= 3 && size > 0.05 * previous && !sklyanin_gyrostat_differences(s, coef, p, residual, jacobian))
-            return sklyanin_gyrostat_NO_CONVERGENCE;
+        const int slow = iteration >= 3 && size > 0.05 * previous;
+        if (slow && !sklyanin_gyrostat_differences(s, coef, p, residual, jacobian, &made)) return sklyanin_gyrostat_NO_CONVERGENCE;
         if (!sklyanin_gyrostat_solve(jacobian, residual)) return sklyanin_gyrostat_SINGULAR;
         for (int i = 0; i < 4; ++i) p[i] -= residual[i];
         previous = size;

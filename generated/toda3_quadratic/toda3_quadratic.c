@@ -12,7 +12,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: f411831bc662fc13caa2a2191c748b0931fabb59f6142952640ab334818efff0
+ * body-sha256: 3a19bd3d3b7367fc03e51ca1b11f08a2ddd630854e25284e07416c10ab54551d
  */
 #include "toda3_quadratic.h"
 
@@ -492,11 +492,11 @@ static int toda3_quadratic_piece(const double *coef, const double p[5], const do
 }
 
 /* The whole path from x, in 1, 2, 4, ... pieces until each expansion converges. Whatever p is, the end of the path
-   lies on the symplectic leaf of x. 0 if the path is too long or leaves the domain. */
+   lies on the symplectic leaf of x. 0 if the path is too long or leaves the domain. *made counts all pieces. */
 static int toda3_quadratic_path(const double *coef, const double x[5], const double p[5], double change[5],
-    double mean[5])
+    double mean[5], int *made)
 {
-    for (int pieces = 1; pieces <= 512; pieces *= 2) {
+    for (int pieces = 1; pieces <= 128; pieces *= 2) {
         double q[5], point[5], shift[5], local[5];
         int good = 1;
         for (int i = 0; i < 5; ++i) {
@@ -506,6 +506,7 @@ static int toda3_quadratic_path(const double *coef, const double x[5], const dou
         for (int piece = 0; piece < pieces && good; ++piece) {
             for (int i = 0; i < 5; ++i) point[i] = x[i] + change[i];
             good = toda3_quadratic_piece(coef, q, point, shift, local);
+            ++*made;
             for (int i = 0; i < 5; ++i) {
                 mean[i] += (change[i] + local[i]) / pieces;
                 change[i] += shift[i];
@@ -519,10 +520,11 @@ static int toda3_quadratic_path(const double *coef, const double x[5], const dou
 /* The residual p - grad S_h(mean of the path) of the equation for p, with that mean y, the path's change of
    x and an approximate Jacobian of the residual. 0 if the path cannot be followed. */
 static int toda3_quadratic_residual(toda3_quadratic_solver *s, const double *coef, const double p[5], double y[5],
-    double residual[5], double change[5], double jacobian[25])
+    double residual[5], double change[5], double jacobian[25],
+    int *made)
 {
     double mean[5];
-    if (!toda3_quadratic_path(coef, s->x, p, change, mean)) return 0;
+    if (!toda3_quadratic_path(coef, s->x, p, change, mean, made)) return 0;
     for (int i = 0; i < 5; ++i) y[i] = s->x[i] + mean[i];
     toda3_quadratic_generate(coef, y, residual, jacobian);
     for (int i = 0; i < 5; ++i) residual[i] = p[i] - residual[i];
@@ -532,20 +534,21 @@ static int toda3_quadratic_residual(toda3_quadratic_solver *s, const double *coe
 
 /* The Jacobian by differences, for steps so large that the approximate one does not contract. */
 static int toda3_quadratic_differences(toda3_quadratic_solver *s, const double *coef, const double p[5],
-    const double residual[5], double jacobian[25])
+    const double residual[5], double jacobian[25], int *made)
 {
     double q[5], y[5], moved[5], change[5], unused[25], norm = DBL_MIN;
     for (int i = 0; i < 5; ++i) norm = fabs(p[i]) > norm ? fabs(p[i]) : norm;
     for (int j = 0; j < 5; ++j) {
         memcpy(q, p, sizeof q);
         q[j] += 1e-7 * norm;
-        if (!toda3_quadratic_residual(s, coef, q, y, moved, change, unused)) return 0;
+        if (!toda3_quadratic_residual(s, coef, q, y, moved, change, unused, made)) return 0;
         for (int i = 0; i < 5; ++i) jacobian[i * 5 + j] = (moved[i] - residual[i]) / (q[j] - p[j]);
     }
     return 1;
 }
 
-/* Solve p = grad S_h(mean of the path from x under p) and move to the end of that path. */
+/* Solve p = grad S_h(mean of the path from x under p) and move to the end of that path. Where that takes more than
+   512 pieces of paths, the step is so large that a solution would mean nothing. */
 static toda3_quadratic_status toda3_quadratic_attempt(toda3_quadratic_solver *s, int stage)
 {
     const double *coef = s->coef[stage], none[5] = { 0.0 };
@@ -553,8 +556,8 @@ static toda3_quadratic_status toda3_quadratic_attempt(toda3_quadratic_solver *s,
     double p[5], y[5], residual[5], change[5], jacobian[25], previous = HUGE_VAL;
     if (!toda3_quadratic_predict(memory, y)) memcpy(y, s->x, sizeof y);
     toda3_quadratic_generate(coef, y, p, jacobian);
-    for (int iteration = 0; iteration < 20; ++iteration) {
-        if (!toda3_quadratic_residual(s, coef, p, y, residual, change, jacobian)) return toda3_quadratic_NO_CONVERGENCE;
+    for (int iteration = 0, made = 0; iteration < 20 && made <= 512; ++iteration) {
+        if (!toda3_quadratic_residual(s, coef, p, y, residual, change, jacobian, &made)) return toda3_quadratic_NO_CONVERGENCE;
         double size = 0.0, norm = DBL_MIN;
         for (int i = 0; i < 5; ++i) {
             if (!isfinite(residual[i])) return toda3_quadratic_NOT_FINITE;
@@ -569,8 +572,8 @@ static toda3_quadratic_status toda3_quadratic_attempt(toda3_quadratic_solver *s,
             toda3_quadratic_remember(memory, y, iteration);
             return toda3_quadratic_OK;
         }
-        if (iteration >= 3 && size > 0.05 * previous && !toda3_quadratic_differences(s, coef, p, residual, jacobian))
-            return toda3_quadratic_NO_CONVERGENCE;
+        const int slow = iteration >= 3 && size > 0.05 * previous;
+        if (slow && !toda3_quadratic_differences(s, coef, p, residual, jacobian, &made)) return toda3_quadratic_NO_CONVERGENCE;
         if (!toda3_quadratic_solve(jacobian, residual)) return toda3_quadratic_SINGULAR;
         for (int i = 0; i < 5; ++i) p[i] -= residual[i];
         previous = size;

@@ -16,6 +16,10 @@ from phigen.scheme.path import PathSlopes, Recurrences
 #: How far an implicit step may lead, in sizes of the state and of what the vector field says, if the energy is lost.
 PLAUSIBLE = 1.5
 
+#: Into how many pieces a path is cut, a power of 2, and after how many pieces, of all paths that were tried, the solve
+#: of a step is given up: measured on the corpus, steps that take more are wrong by as much as the state, as a rule.
+LONGEST_PATH, MOST_PIECES = 128, 512
+
 
 @dataclass(frozen=True)
 class _Staged:

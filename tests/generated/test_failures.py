@@ -12,7 +12,7 @@ from support import BODY, NAMES, SPECIES, TARGETS, PreciseStep, RawC, compile_te
 from phigen import spec
 from phigen.compiler import compile_spec
 from phigen.errors import ParameterError, StepError
-from phigen.scheme.steps import Explicit, Newton, Path, Splitting
+from phigen.scheme.steps import LONGEST_PATH, MOST_PIECES, Explicit, Newton, Path, Splitting
 from phigen.spec.model import Extras
 
 STATUSES = {"OK": 0, "NO_CONVERGENCE": 1, "SINGULAR": 2, "NOT_FINITE": 3, "BAD_ARGUMENT": 4}
@@ -106,6 +106,20 @@ def test_after_a_step_that_was_too_large_the_run_goes_on(name, factor):
         assert raw.counters[0] == steps
         assert raw.integrate(at.h, 10) == other.integrate(at.h, 10) == 0
         np.testing.assert_allclose(raw.x, other.x, rtol=0, atol=1e-13 * np.max(np.abs(before)))
+
+
+def test_a_hopeless_path_ends_early(monkeypatch):
+    """The solve of a step a thousand times too long follows no path for long: in C it took 68 evaluations of long paths."""
+    compilation = compiled("nambu_pendulum")
+    raw, module = RawC(compilation), solver(compilation, "numpy").backend.module
+    raw.init([0.6, 0.1, 0.7])
+    assert raw.step(709.0) == STATUSES["NO_CONVERGENCE"]
+    assert raw.counters[1] <= 20
+    follow, pieces = module._piece, []
+    monkeypatch.setattr(module, "_piece", lambda *arguments: pieces.append(1) or follow(*arguments))
+    with pytest.raises(module.StepError, match="NO_CONVERGENCE"):
+        module.step([1.7, 0.6, -0.5], 709.0)
+    assert len(pieces) <= MOST_PIECES + 4 * 2 * LONGEST_PATH
 
 
 # -- parameters with which there are no steps

@@ -8,7 +8,17 @@ from typing import Any
 
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.program import Program
-from phigen.scheme.steps import PLAUSIBLE, Explicit, Implicit, InnerSolve, Newton, Path, Splitting
+from phigen.scheme.steps import (
+    LONGEST_PATH,
+    MOST_PIECES,
+    PLAUSIBLE,
+    Explicit,
+    Implicit,
+    InnerSolve,
+    Newton,
+    Path,
+    Splitting,
+)
 from phigen.spec.model import Parameter
 from phigen.targets import special
 from phigen.targets.c import extras, lanes, packs, small, splitting
@@ -131,6 +141,8 @@ def _memory_values(program: Program) -> dict[str, Any]:
         "repay": REPAY,
         "reach": repr(REACH),
         "plausible": repr(PLAUSIBLE),
+        "longest_path": LONGEST_PATH,
+        "most_pieces": MOST_PIECES,
         "most_repay": 4 * REPAY,
         "group_repay": GROUP_REPAY * program.dimension,
         "window": window,

@@ -8,7 +8,17 @@ from dataclasses import replace
 
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.program import Program
-from phigen.scheme.steps import PLAUSIBLE, Explicit, Implicit, InnerSolve, Newton, Path, Splitting
+from phigen.scheme.steps import (
+    LONGEST_PATH,
+    MOST_PIECES,
+    PLAUSIBLE,
+    Explicit,
+    Implicit,
+    InnerSolve,
+    Newton,
+    Path,
+    Splitting,
+)
 from phigen.symbolic import functions as elementary
 from phigen.symbolic.expression import Expression
 from phigen.symbolic.symbols import Symbol
@@ -140,6 +150,8 @@ def _values(program: Program) -> dict[str, object]:
         "gauge": _strings(program.gauge.casimirs if program.gauge else ()),
         "prepare_arguments": "values, np.zeros((len(GAUGE), 1)), 1e-100" if program.gauge else "values, 1e-100",
         "plausible": repr(PLAUSIBLE),
+        "path_pieces": repr(tuple(1 << k for k in range(LONGEST_PATH.bit_length()))),
+        "most_pieces": MOST_PIECES,
         "fractions": "(" + "".join(f"{f!r}, " for f in program.fractions).rstrip() + ")",
         "terms": TERMS,
         "series": len(step.recurrences.series) if isinstance(step, Path) else 0,
