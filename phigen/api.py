@@ -13,10 +13,11 @@ from collections.abc import Mapping
 from os import PathLike
 from typing import TYPE_CHECKING
 
+from phigen import registry
 from phigen import spec as specs
 from phigen.analysis.proof import compile_proved, located
 from phigen.compiler import Compilation, emit
-from phigen.errors import Diagnostic, SpecError, ToolchainError
+from phigen.errors import Diagnostic, SpecError
 from phigen.geometry.system import System, system_from_spec
 from phigen.spec import limits
 from phigen.spec.model import Extras, Spec
@@ -31,8 +32,6 @@ if TYPE_CHECKING:
 
 #: What `compile` takes.
 Source = str | PathLike[str] | Spec | System | Compilation
-
-TARGETS = ("auto", "c", "numpy")
 
 
 def load(path: str | PathLike[str]) -> System:
@@ -62,8 +61,9 @@ def compile(
     `Solver.step_tangent`. Compiled C is cached by its content. Raises `SpecError`, `LimitError`, `CheckError` if the
     mathematics is refuted, e.g. since π is not Poisson, and `ToolchainError` if C was asked for in vain.
     """
-    if target not in TARGETS:
-        raise ValueError(f"unknown target {target!r}; there are {', '.join(TARGETS)}")
+    if target != "auto" and not registry.find(target).loader:
+        runnable = ", ".join(registry.LOADABLE)
+        raise ValueError(f"Python cannot run the target {target!r}; it can run {runnable}")
     if scheme is not None and scheme not in SCHEMES:
         raise ValueError(f"unknown scheme {scheme!r}; there are {', '.join(SCHEMES)}")
     return solver_of(compilation_of(source, order, Extras(tangent=True) if tangent else None, scheme), target)
@@ -104,11 +104,7 @@ def solver_of(compilation: Compilation, target: str = "auto") -> Solver:
 
 def backend_of(files: Mapping[str, str], interface: Interface) -> Backend:
     """The back end of generated files (name → text) of one target. Raises `ToolchainError`."""
-    from phigen.runtime.c_solver import CSolver
-    from phigen.runtime.numpy_solver import NumpySolver
-
-    module = files.get(f"{interface.name}.py")
-    return NumpySolver.from_source(module, interface) if module else CSolver.compile(files, interface)
+    return registry.target_of(files, interface.name).load(files, interface)
 
 
 def interface_of(program: Program) -> Interface:
@@ -126,16 +122,13 @@ def interface_of(program: Program) -> Interface:
 
 
 def chosen_target(target: str) -> str:
-    """``c`` or ``numpy``; ``auto`` is C where there is a compiler."""
+    """The name of a target; ``auto`` is C where there is a compiler, else NumPy."""
     from phigen.runtime import toolchain
 
     if target != "auto":
         return target
-    try:
-        toolchain.find()
-    except ToolchainError:
-        return "numpy"
-    return "c"
+    compiler = toolchain.available()
+    return next(t for t in registry.LOADABLE if compiler or not registry.TARGETS[t].compiled)
 
 
 def _spec_of(system: System) -> Spec:

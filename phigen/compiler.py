@@ -15,7 +15,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
-from phigen import progress
+from phigen import progress, registry
 from phigen import spec as specs
 from phigen.geometry.system import System, system_from_spec
 from phigen.realisations.catalogue import realise
@@ -156,11 +156,5 @@ def compile_file(path: str | Path, *, order: int | None = None) -> Compilation:
 
 
 def emit(program: Program, target: str, command: str, *, single_file: bool = False) -> dict[str, str]:
-    """The files of one target (``c`` or ``numpy``), by name; ``command`` is what regenerates them."""
-    if target == "c":
-        from phigen.targets.c import emitter as c
-
-        return c.emit(program, command, single_file=single_file)
-    from phigen.targets.numpy import emitter as numpy
-
-    return numpy.emit(program, command)
+    """The files of one target, by name; ``command`` is what regenerates them. `ValueError` for unknown targets."""
+    return registry.find(target).emit(program, command, single_file=single_file)

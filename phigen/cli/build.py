@@ -15,6 +15,7 @@ from phigen.cli.failures import Collector
 from phigen.cli.generation import DIRECTORY, Options, files_of, output_options
 from phigen.cli.sources import found, load_all, many_specs
 from phigen.errors import CheckError
+from phigen.registry import TARGETS
 
 if TYPE_CHECKING:
     from phigen.cli.outputs import Change
@@ -96,24 +97,24 @@ def _compile_all(console: Console, spec_files: Sequence[str], options: Options) 
 def _plan(
     console: Console, compilations: Sequence[Compilation], options: Options
 ) -> list[tuple[Compilation, list[Change]]]:
-    from phigen.cli.outputs import SUFFIXES, changes
+    from phigen.cli.outputs import changes
 
     result = []
     for compilation in compilations:
         name, start = compilation.spec.name, time.perf_counter()
         files = files_of(compilation, options)
         console.detail(f"{name}: {time.perf_counter() - start:.2f} s emitting")
-        result.append((compilation, changes(options.directory / name, name, files, options.targets or SUFFIXES)))
+        result.append((compilation, changes(options.directory / name, name, files, options.targets or TARGETS)))
     return result
 
 
 def _orphans(spec_files: Sequence[str], compilations: Sequence[Compilation], options: Options) -> Iterator[Change]:
     """Files whose spec has gone; only a run over a folder can know."""
-    from phigen.cli.outputs import SUFFIXES, orphans
+    from phigen.cli.outputs import orphans
 
     if any(Path(found(file)).is_dir() for file in spec_files):
         names = [c.spec.name for c in compilations]
-        yield from orphans(options.directory, names, options.targets or SUFFIXES)
+        yield from orphans(options.directory, names, options.targets or TARGETS)
 
 
 def _compare(planned: Sequence[Change], command: str, diff: bool) -> None:
@@ -165,7 +166,7 @@ def _write(
         _report(console, options.directory / compilation.spec.name, compilation, changes)
     if compiling:
         for compilation, _ in planned:
-            if "c" in options.targets_of(compilation):
+            if any(TARGETS[t].compiled for t in options.targets_of(compilation)):
                 _compile_library(console, options.directory / compilation.spec.name, compilation.spec.name)
 
 

@@ -12,6 +12,7 @@ import click
 
 from phigen import resources
 from phigen.cli.sources import CORRECTIONS, ORDER, scheme_option
+from phigen.registry import TARGETS
 
 if TYPE_CHECKING:
     from phigen.compiler import Compilation
@@ -79,7 +80,7 @@ def output_options(command: F) -> F:
             "--target",
             "targets",
             multiple=True,
-            type=click.Choice(["c", "numpy"]),
+            type=click.Choice(list(TARGETS)),
             help="Instead of the spec's targets.",
         ),
     ):
@@ -91,7 +92,7 @@ def generate(compilation: Compilation, target: str, options: Options) -> dict[st
     """The files of one target. Their header names a command that gives the same bytes on any machine."""
     from phigen.compiler import emit
 
-    spec, single = compilation.spec, options.single_file and target == "c"
+    spec, single = compilation.spec, options.single_file and TARGETS[target].single_file
     words = ["phigen build", spec.name if _is_bundled(spec) else f"{spec.name}.yaml"]
     words += ["-t", target] if target not in spec.targets else []
     words += ["--order", str(options.order)] if options.order not in (None, spec.order) else []

@@ -19,6 +19,7 @@ from typing import Any
 from phigen._version import __version__
 from phigen.cli.generation import Options
 from phigen.errors import CheckError
+from phigen.registry import TARGETS, suffixes
 from phigen.spec import limits
 from phigen.spec.names import SCHEMES, SPEC_NAME
 
@@ -126,7 +127,7 @@ def _entry(name: str, part: Mapping[str, Any]) -> Entry:
         raise ValueError(f"{name!r} is no name of a solver, or its spec no file")
     files = {str(file): str(digest) for file, digest in part["files"].items()}
     for file in files:
-        if not re.fullmatch(rf"{name}\.(c|h|py)", file):
+        if file not in {f"{name}{suffix}" for suffix in suffixes()}:
             raise ValueError(f"{name}: {file!r} is no file of that solver")
     return Entry(name, _options(name, options), spec_file, text, str(part["license"]), files, str(part["phigen"]))
 
@@ -136,7 +137,7 @@ def _options(name: str, given: dict[str, Any]) -> Options:
     options = Options(targets=targets, **given)
     order, modified = options.order, options.modified
     if (
-        not set(targets) <= {"c", "numpy"}
+        not set(targets) <= set(TARGETS)
         or not (order is None or (type(order) is int and 1 <= order <= limits.ORDER))
         or not (modified is None or (type(modified) is int and 0 <= modified <= limits.CORRECTIONS))
         or options.scheme not in (None, *SCHEMES)

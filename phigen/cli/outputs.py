@@ -11,10 +11,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from phigen.errors import CheckError
+from phigen.registry import suffixes
 from phigen.targets.header import is_edited, split
-
-#: Suffixes of the files of a target.
-SUFFIXES = {"c": (".c", ".h"), "numpy": (".py",)}
 
 
 @dataclass(frozen=True)
@@ -56,7 +54,7 @@ def changes(folder: Path, name: str, files: Mapping[str, str], targets: Iterable
     """What building NAME means for its folder: its files, and files of the same targets it no longer has."""
     _expect_own_folder(folder)
     result = [Change(folder / file, read(folder / file), text) for file, text in files.items()]
-    for suffix in (s for target in targets for s in SUFFIXES[target]):
+    for suffix in suffixes(targets):
         path = folder / f"{name}{suffix}"
         if path.name not in files and path.is_file():
             before = read(path)
@@ -68,9 +66,9 @@ def changes(folder: Path, name: str, files: Mapping[str, str], targets: Iterable
 def orphans(directory: Path, names: Iterable[str], targets: Iterable[str]) -> Iterator[Change]:
     """Generated files ``DIR/NAME/NAME.*`` of names that are not among the given ones."""
     known = set(names)
-    suffixes = [s for target in targets for s in SUFFIXES[target]]
+    endings = suffixes(targets)
     for folder in sorted(directory.iterdir()) if directory.is_dir() else []:
-        for path in [folder / f"{folder.name}{s}" for s in suffixes] if folder.name not in known else []:
+        for path in [folder / f"{folder.name}{s}" for s in endings] if folder.name not in known else []:
             before = read(path)
             if before is not None and split(before)[0] is not None:
                 yield Change(path, before, None)

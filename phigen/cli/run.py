@@ -13,6 +13,7 @@ from phigen.cli.experiment import loaded, prepared
 from phigen.cli.interruption import InterruptedRunError
 from phigen.cli.run_summary import described_run, finite, print_summary
 from phigen.cli.sources import FIGURES, ORDER, file_ending, load_one, one_spec, run_option, scheme_option
+from phigen.registry import LOADABLE
 
 if TYPE_CHECKING:
     from phigen.cli.recording import Recorder
@@ -24,7 +25,7 @@ _TABLES = (".csv", ".npz")
 @click.command("run")
 @one_spec
 @run_option
-@click.option("-t", "--target", type=click.Choice(["auto", "c", "numpy"]), default="auto", show_default=True)
+@click.option("-t", "--target", type=click.Choice(["auto", *LOADABLE]), default="auto", show_default=True)
 @click.option("--order", metavar="K", type=ORDER, help="Order of the method, instead of the spec's.")
 @scheme_option
 @click.option("--step", metavar="H", type=float, help="Step size, instead of the run's.")

@@ -21,6 +21,7 @@ from phigen.cli.generation import Options, files_of, output_options
 from phigen.cli.manifest import Entry
 from phigen.cli.sources import SUFFIXES, as_given, load_all
 from phigen.errors import CheckError
+from phigen.registry import suffixes
 
 if TYPE_CHECKING:
     from phigen.cli.outputs import Change
@@ -284,14 +285,12 @@ def _cause(known: Entry | None, made: Made) -> str:
 
 def _extra(folder: Path, entries: Mapping[str, Entry]) -> Iterator[Problem]:
     """Generated files that the manifest does not know; others are the user's."""
-    from phigen.cli.outputs import SUFFIXES as OUTPUTS
     from phigen.cli.outputs import read
     from phigen.targets.header import split
 
     known = {file for entry in entries.values() for file in entry.files}
-    suffixes = [s for listed in OUTPUTS.values() for s in listed]
     for path in sorted(folder.iterdir()):
-        if path.suffix in suffixes and path.is_file() and path.name not in known and split(read(path) or "")[0]:
+        if path.suffix in suffixes() and path.is_file() and path.name not in known and split(read(path) or "")[0]:
             yield Problem(path, "extra: generated, but not in the manifest", shlex.join(["rm", str(path)]))
 
 

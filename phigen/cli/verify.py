@@ -16,6 +16,7 @@ from phigen.cli.experiment import Experiment, prepared
 from phigen.cli.failures import Collector
 from phigen.cli.sources import FIGURES, ORDER, file_ending, load_all, many_specs, run_option, scheme_option
 from phigen.errors import CheckError, StepError
+from phigen.registry import loadable
 
 if TYPE_CHECKING:
     from phigen.analysis.backward import Constancy
@@ -118,14 +119,18 @@ def with_tangent(spec: Spec) -> Any:
 def verified(
     compilation: Compilation, name: str | None, quick: bool, console: Console, targets: Sequence[str] = ()
 ) -> Verification:
-    """The verification of a compilation with its tangent map on a run of its spec; of the spec's targets by default."""
+    """The verification of a compilation with its tangent map on a run of its spec; of the spec's targets by default.
+
+    Targets that Python cannot run are left out.
+    """
     from phigen.analysis.verification import verify
-    from phigen.api import solver_of
+    from phigen.api import chosen_target, solver_of
 
     spec = compilation.spec
     experiment = prepared(spec, name)
     run = experiment.run
-    solvers = {target: solver_of(compilation, target) for target in targets or spec.targets}
+    chosen = loadable(targets or spec.targets) or (chosen_target("auto"),)
+    solvers = {target: solver_of(compilation, target) for target in chosen}
     console.detail(f"{spec.name}: built {', '.join(solvers)}")
     return verify(
         compilation, solvers, run.name, experiment.initial, experiment.parameters, float(run.step), run.steps,

@@ -14,6 +14,7 @@ from phigen.analysis.summary import Drift, Summary
 from phigen.analysis.verification import Check, Verification
 from phigen.compiler import Compilation
 from phigen.realisations.protocol import BiRealisation
+from phigen.registry import TARGETS
 from phigen.report import page
 from phigen.report.material import Material
 from phigen.symbolic.verdict import PROVED, REFUTED, UNDECIDED, Statement
@@ -78,7 +79,7 @@ def measured_section(v: Verification) -> Markup:
     columns = [("", "property"), ("number", "phigen"), ("", "required"), ("verdict", "verdict")]
     columns += [("number", method) for method in v.compared]
     rows = [_check(check, v.compared) for check in v.checks]
-    targets = " and ".join({"c": "C", "numpy": "NumPy"}.get(t, t) for t in v.targets)
+    targets = " and ".join(TARGETS[t].title for t in v.targets)
     said = f"Run {v.run}: {v.steps} steps of {v.step:.9g}, generated for {targets}. Solver: {v.label}."
     meanings = dict.fromkeys(meaning_of(check.name) for check in v.checks)
     rows_explained = page.facts((m.row, page.typeset(_meaning(m))) for m in meanings)

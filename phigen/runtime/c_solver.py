@@ -206,3 +206,8 @@ def _aligned_copy(struct: Bytes) -> Bytes:
 
 def _status(value: int) -> str:
     return STATUSES[value] if value < len(STATUSES) else f"STATUS_{value}"
+
+
+def load(files: Mapping[str, str], interface: Interface) -> CSolver:
+    """The back end of generated files; see `phigen.registry`."""
+    return CSolver.compile(files, interface)

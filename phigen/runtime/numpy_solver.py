@@ -207,3 +207,8 @@ class NumpySolver:
     def vector_field(self, x: Floats, parameters: Mapping[str, float]) -> Floats:
         """See `phigen.runtime.backend.Backend`."""
         return np.asarray(self.module.vector_field(x, **parameters), dtype=np.float64)
+
+
+def load(files: Mapping[str, str], interface: Interface) -> NumpySolver:
+    """The back end of generated files; see `phigen.registry`."""
+    return NumpySolver.from_source(files[f"{interface.name}.py"], interface)

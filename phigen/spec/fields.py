@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from phigen.registry import TARGETS
 from phigen.spec import limits
 from phigen.spec.kinds import (
     Boolean,
@@ -202,7 +203,7 @@ SPEC = Record(
             "also generate the modified Hamiltonian, with so many correction terms",
             default=0,
         ),
-        Field("targets", ListOf(Choice(("c", "numpy")), least=1), "languages of the generated code"),
+        Field("targets", ListOf(Choice(tuple(TARGETS)), least=1), "languages of the generated code"),
         Field("runs", MapOf(RUN_NAME, RUN), "named experiments"),
     ),
     one=("order", "terms"),

@@ -13,6 +13,7 @@ from fractions import Fraction
 from typing import Any
 
 from phigen.errors import Diagnostic, Location
+from phigen.registry import DEFAULT
 from phigen.symbolic.expression import Expression
 
 Matrix = tuple[tuple[Expression, ...], ...]
@@ -174,7 +175,7 @@ class Spec:
     scheme: str = "auto"
     solver: SolverOptions = SolverOptions()
     extras: Extras = NO_EXTRAS
-    targets: tuple[str, ...] = ("c", "numpy")
+    targets: tuple[str, ...] = DEFAULT
     runs: Mapping[str, Run] = field(default_factory=dict)
     title: str = ""
     description: str = ""

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from typing import Any
 
+from phigen.registry import DEFAULT
 from phigen.spec.declarations import Declarations, declare
 from phigen.spec.fields import SPEC
 from phigen.spec.kinds import Reader
@@ -67,7 +68,7 @@ def _parts(raw: Mapping[str, Any], declared: Declarations) -> dict[str, Any]:
         "gauge": _gauge(raw.get("gauge", "auto"), declared),
         "scheme": raw.get("scheme", "auto"),
         "solver": _solver(raw.get("solver", {}), declared),
-        "targets": without_repetition(raw.get("targets", ("c", "numpy")), ("targets",), declared),
+        "targets": without_repetition(raw.get("targets", DEFAULT), ("targets",), declared),
         "extras": Extras(raw.get("tangent", False), raw.get("modified_hamiltonian", 0)),
         "runs": {n: run(n, r, declared) for n, (_, r) in raw.get("runs", {}).items() if r is not None},
         "title": raw.get("title", ""),

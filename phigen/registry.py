@@ -1,0 +1,95 @@
+"""The targets: the languages that phigen writes solvers in.
+
+Every list of targets derives from this one: the choices of the command line, what a spec may ask for, the suffixes of
+generated files, what can be loaded. It imports what emits and what loads a target when that is asked for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from difflib import get_close_matches
+from importlib import import_module
+from typing import TYPE_CHECKING, cast
+
+if TYPE_CHECKING:
+    from phigen.runtime.backend import Backend
+    from phigen.runtime.interface import Interface
+    from phigen.scheme.program import Program
+
+
+@dataclass(frozen=True)
+class Target:
+    """A language.
+
+    ``emitter`` is the module whose ``emit(program, command)`` gives file names and their contents; it takes
+    ``single_file`` too if that is offered. ``loader`` is the module whose ``load(files, interface)`` makes a back end
+    of them, empty if Python cannot run them. ``suffixes`` are those of all files, the first that of the main one.
+    Specs that name no targets get those of ``default``.
+    """
+
+    name: str
+    title: str
+    suffixes: tuple[str, ...]
+    emitter: str
+    loader: str = ""
+    default: bool = False
+    single_file: bool = False
+    compiled: bool = False
+
+    def emit(self, program: Program, command: str, *, single_file: bool = False) -> dict[str, str]:
+        """File names and contents; ``command`` is what regenerates them."""
+        options = {"single_file": True} if single_file and self.single_file else {}
+        return cast(dict[str, str], import_module(self.emitter).emit(program, command, **options))
+
+    def load(self, files: Mapping[str, str], interface: Interface) -> Backend:
+        """The back end of generated files. Raises `ToolchainError`."""
+        return cast("Backend", import_module(self.loader).load(files, interface))
+
+
+_LISTED = (
+    Target(
+        "c",
+        "C",
+        (".c", ".h"),
+        "phigen.targets.c.emitter",
+        "phigen.runtime.c_solver",
+        default=True,
+        single_file=True,
+        compiled=True,
+    ),
+    Target("numpy", "NumPy", (".py",), "phigen.targets.numpy.emitter", "phigen.runtime.numpy_solver", default=True),
+)
+
+#: All targets by name.
+TARGETS: Mapping[str, Target] = {target.name: target for target in _LISTED}
+
+#: What a spec gets that asks for none, and what Python can run.
+DEFAULT = tuple(target.name for target in _LISTED if target.default)
+LOADABLE = tuple(target.name for target in _LISTED if target.loader)
+
+
+def find(name: str) -> Target:
+    """The target of that name. Raises `ValueError` with a hint if there is none."""
+    if name not in TARGETS:
+        listed = {word: t.name for t in _LISTED for word in (t.name, t.title.lower())}
+        near = get_close_matches(name.lower(), listed, 1)
+        hint = f"did you mean {listed[near[0]]!r}?" if near else f"there are {', '.join(TARGETS)}"
+        raise ValueError(f"unknown target {name!r}; {hint}")
+    return TARGETS[name]
+
+
+def suffixes(targets: Iterable[str] = TARGETS) -> list[str]:
+    """The suffixes of the files of these targets, of all by default."""
+    return [suffix for target in targets for suffix in TARGETS[target].suffixes]
+
+
+def loadable(targets: Iterable[str]) -> tuple[str, ...]:
+    """Those of the targets that Python can run."""
+    return tuple(target for target in targets if target in LOADABLE)
+
+
+def target_of(files: Iterable[str], name: str) -> Target:
+    """The target whose main file is among the files of a solver."""
+    present = set(files)
+    return next(target for target in _LISTED if f"{name}{target.suffixes[0]}" in present)
