@@ -20,7 +20,7 @@ def machine() -> str:
         names = [line.partition(":")[2].strip() for line in info.read_text().splitlines() if "model name" in line]
         model = f"{names[0]}, {len(names)} cores" if names else model
     compiler = toolchain.find()
-    return f"{model}; {compiler.version}; `{' '.join(toolchain.flags(compiler))}`; Python {platform.python_version()}"
+    return f"{model}; {compiler.version}; `{' '.join(compiler.flags)}`; Python {platform.python_version()}"
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:

@@ -9,7 +9,8 @@ trajectory = solver.integrate([1, 1, 1], h=0.05, steps=20_000, stride=10, I2=2.5
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+import warnings
+from collections.abc import Callable, Mapping
 from os import PathLike
 from typing import TYPE_CHECKING
 
@@ -56,10 +57,11 @@ def compile(
 ) -> Solver:
     """A solver of a system: of one from `load` or `System.from_sympy`, of a spec, or of the path of a spec file.
 
-    ``target`` is ``c``, ``numpy``, or ``auto``: C if there is a compiler, else NumPy. ``order`` overrides the
-    order of the spec, ``scheme`` (``series``, ``splitting``, ``auto``) its scheme; ``tangent`` asks for
+    ``target`` is ``c``, ``numpy``, or ``auto``: C if there is a compiler, else NumPy with a `RuntimeWarning`. ``order``
+    overrides the order of the spec, ``scheme`` (``series``, ``splitting``, ``auto``) its scheme; ``tangent`` asks for
     `Solver.step_tangent`. Compiled C is cached by its content. Raises `SpecError`, `LimitError`, `CheckError` if the
-    mathematics is refuted, e.g. since π is not Poisson, and `ToolchainError` if C was asked for in vain.
+    mathematics is refuted, e.g. since π is not Poisson, and `ToolchainError` if C was asked for in vain,
+    or by naming a compiler in CC that does not work.
     """
     if target != "auto" and not registry.find(target).loader:
         runnable = ", ".join(registry.LOADABLE)
@@ -98,8 +100,12 @@ def solver_of(compilation: Compilation, target: str = "auto") -> Solver:
     from phigen.runtime.solver import Solver
 
     program, interface = compilation.program, interface_of(compilation.program)
-    files = emit(program, chosen_target(target), f"phigen build {program.name}.yaml")
+    files = emit(program, chosen_target(target, _warn), f"phigen build {program.name}.yaml")
     return Solver(backend_of(files, interface), interface)
+
+
+def _warn(message: str) -> None:
+    warnings.warn(message, RuntimeWarning, stacklevel=2)
 
 
 def backend_of(files: Mapping[str, str], interface: Interface) -> Backend:
@@ -121,14 +127,22 @@ def interface_of(program: Program) -> Interface:
     )
 
 
-def chosen_target(target: str) -> str:
-    """The name of a target; ``auto`` is C where there is a compiler, else NumPy."""
+def chosen_target(target: str, tell: Callable[[str], None] = lambda message: None) -> str:
+    """The name of a target; ``auto`` is C where there is a compiler, else NumPy, and ``tell`` hears why.
+
+    Raises `ToolchainError` if a compiler is named in CC that does not work.
+    """
     from phigen.runtime import toolchain
 
     if target != "auto":
         return target
-    compiler = toolchain.available()
-    return next(t for t in registry.LOADABLE if compiler or not registry.TARGETS[t].compiled)
+    try:
+        toolchain.find()
+    except toolchain.NoCompilerError as error:
+        what, _, hint = str(error).partition("\n")
+        tell(f"{what}; using NumPy, which is slower\n{hint}")
+        return "numpy"
+    return "c"
 
 
 def _spec_of(system: System) -> Spec:

@@ -40,6 +40,13 @@ def compiled_solvers(request, tmp_path_factory):
         yield shared
 
 
+@pytest.fixture
+def without_compiler(monkeypatch, tmp_path_factory):
+    """As on a machine that has none."""
+    monkeypatch.delenv("CC", raising=False)
+    monkeypatch.setenv("PATH", str(tmp_path_factory.mktemp("empty")))
+
+
 def pytest_terminal_summary(terminalreporter):
     skipped = [report.longrepr[2] for report in terminalreporter.stats.get("skipped", [])]
     if skipped:

@@ -83,12 +83,19 @@ def test_wrong_arguments_are_refused(arguments, error):
         phigen.compile(3.0)
 
 
-def test_auto_is_numpy_without_compiler_and_c_with_one(monkeypatch):
+def test_auto_is_numpy_with_a_warning_without_compiler_and_c_with_one(request):
     assert phigen.compile(RIGID_BODY, order=2).target == "c"
-    monkeypatch.setenv("CC", "/there/is/none")
-    assert phigen.compile(RIGID_BODY, order=2).target == "numpy"
+    request.getfixturevalue("without_compiler")
+    with pytest.warns(RuntimeWarning, match="no C compiler works: none of cc, gcc, clang is there; using NumPy"):
+        assert phigen.compile(RIGID_BODY, order=2).target == "numpy"
     with pytest.raises(phigen.ToolchainError):
         phigen.compile(RIGID_BODY, target="c", order=2)
+
+
+def test_a_compiler_that_is_named_is_used_or_refused(monkeypatch):
+    monkeypatch.setenv("CC", "/there/is/none")
+    with pytest.raises(phigen.ToolchainError, match="/there/is/none, is not there"):
+        phigen.compile(RIGID_BODY, order=2)
 
 
 def test_error_of_load_shows_the_line(tmp_path):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import shlex
 import time
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -224,7 +225,7 @@ def _compile_library(console: Console, folder: Path, name: str) -> None:
     from phigen.runtime import toolchain
 
     found, start = toolchain.find(), time.perf_counter()
-    compiler = toolchain.Compiler((*found.command, *STRICT), found.version)
+    compiler = replace(found, tuning=found.tuning + STRICT)
     fresh, library = folder / f".{_library(name)}.new", folder / _library(name)
     try:
         toolchain.compile_library([folder / f"{name}.c"], fresh, compiler)

@@ -84,11 +84,7 @@ def loaded(compilation: Compilation, target: str, console: Console) -> Solver:
     """The solver; where auto falls back to NumPy, stderr says so."""
     from phigen.api import chosen_target, solver_of
 
-    chosen = chosen_target(target)
-    if target == "auto" and chosen == "numpy":
-        console.note(
-            "no C compiler found: using the NumPy target, which is slower; install gcc or clang, or name one in CC"
-        )
+    chosen = chosen_target(target, console.note)
     start = time.perf_counter()
     solver = solver_of(compilation, chosen)
     console.detail(f"{compilation.spec.name}: {chosen} ready after {time.perf_counter() - start:.2f} s")

@@ -71,8 +71,7 @@ def command(
     spec = load_one(spec_file)
     experiment = prepared(spec, name, settings=settings)
     compilation = compile_proved(spec)
-    if chosen_target("auto") == "numpy":
-        console.note("no C compiler found: timing the NumPy target; install gcc or clang, or name one in CC")
+    chosen_target("auto", console.note)
     problem = problem_of(compilation.system, experiment, horizon)
     found = tune(compilation, problem, measure, accuracy, budget, console.note)
     if plot:

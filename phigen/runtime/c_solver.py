@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from phigen.errors import ToolchainError
 from phigen.runtime import cache
 from phigen.runtime.interface import BackendError, Floats, Interface, MissingExtraError
 
@@ -104,7 +105,12 @@ class CSolver:
         self._c: Any = SimpleNamespace()
         offered = {name: s for name, s in _EXTRAS.items() if hasattr(library, f"{interface.name}_{name}")}
         for name, (result, arguments) in {**_SIGNATURES, **offered}.items():
-            function = getattr(library, f"{interface.name}_{name}")
+            function = getattr(library, f"{interface.name}_{name}", None)
+            if function is None:
+                raise ToolchainError(
+                    f"the compiled solver has no function {interface.name}_{name}\n"
+                    "  hint: whatever CC names did not compile what it was given; try gcc or clang"
+                )
             function.restype, function.argtypes = result, arguments
             setattr(self._c, name, function)
 

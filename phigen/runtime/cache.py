@@ -65,7 +65,7 @@ def load(files: Mapping[str, str]) -> ctypes.CDLL:
     try:
         return ctypes.CDLL(str(path))
     except OSError as error:
-        hint = "set PHIGEN_CACHE_DIR to a folder whose libraries may be loaded"
+        hint = "set PHIGEN_CACHE_DIR to a folder whose libraries may be loaded, or CC to a compiler for this machine"
         raise ToolchainError(f"the compiled solver cannot be loaded: {error}\n  hint: {hint}") from error
 
 
@@ -141,7 +141,7 @@ def _key(files: Mapping[str, str], compiler: Compiler) -> str:
     facts = {
         "files": dict(files),
         "compiler": [compiler.command, compiler.version],
-        "flags": toolchain.flags(compiler),
+        "flags": compiler.flags,
         "machine": _machine(),
     }
     return hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()[:40]

@@ -238,12 +238,24 @@ def test_wrong_setting_is_a_usage_error(phigen, wrong):
     assert phigen("run", SPECS / "rigid_body.yaml", "--set", wrong).exit_code == 2
 
 
-def test_run_falls_back_to_numpy_and_says_so(phigen, write, monkeypatch):
-    monkeypatch.setenv("CC", "/there/is/none")
+def test_run_falls_back_to_numpy_and_says_so(phigen, write, without_compiler):
     done = phigen("run", write("a.yaml"))
     assert done.exit_code == 0
     assert "no C compiler" in done.stderr
     assert "target numpy" in done.stdout
+
+
+@pytest.mark.parametrize("named", ["/there/is/none", 'gcc "', "true"])
+def test_a_compiler_that_is_named_is_used_or_refused(phigen, write, monkeypatch, named):
+    monkeypatch.setenv("CC", named)
+    for command in (["run", write("a.yaml")], ["build", "a.yaml", "--compile"]):
+        done = phigen(*command)
+        assert done.exit_code == 6
+        assert done.stderr.startswith("error: ") or "\nerror: " in done.stderr
+        assert named in done.stderr
+        assert done.stdout == ""
+    assert not list(Path("generated").rglob("*.so*"))
+    assert phigen("run", "a.yaml", "-t", "numpy").exit_code == 0
 
 
 def test_run_without_runs_explains(phigen, write):

@@ -95,8 +95,7 @@ def test_missing_file_is_an_error_of_the_spec(phigen):
     assert "there is no file" in done.stderr
 
 
-def test_without_compiler_times_are_those_of_python(phigen, monkeypatch):
-    monkeypatch.setenv("CC", "/there/is/none")
+def test_without_compiler_times_are_those_of_python(phigen, without_compiler):
     text = GOOD.format(name="a", order=2).replace("steps: 50", "steps: 4")
     done = phigen(write(text), "--quick")
     assert done.exit_code == 0
