@@ -129,7 +129,7 @@ def _split(spec: Spec, source: System, order: int | None, described: Mapping[str
     discretised = gauge.applied(source)
     parts = clock.timed("splitting", lambda: split(discretised))
     choice = clock.timed(
-        "composition", lambda: plan_splitting(discretised, parts, order or spec.order, spec.composition)
+        "composition", lambda: plan_splitting(discretised, parts, order or spec.wanted_order, spec.composition)
     )
     described = {**described, "lanes": spec.solver.lanes}
     program = clock.timed("program", lambda: build_splitting(source, choice, gauge, **described))

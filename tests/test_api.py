@@ -6,6 +6,7 @@ import sympy
 
 import phigen
 from phigen import resources, spec
+from phigen.spec import json_schema
 
 RIGID_BODY = resources.bundled_specs() / "rigid_body.yaml"
 
@@ -54,6 +55,18 @@ def test_system_from_sympy_compiles_and_takes_parameters():
     assert np.ptp(trajectory.energy) < 1e-7
     with pytest.raises(ValueError, match="positive"):
         solver.step([1, 1], h=0.1, k=-1)
+
+
+def test_the_order_that_nobody_asked_for_is_the_same_everywhere(tmp_path):
+    """In a file, in Python, in the schema of the format, for a splitting."""
+    text = "phigen: 1\nname: lv\ncoordinates: [x, y]\npoisson: {log_canonical: [[0, 1], [-1, 0]]}\nhamiltonian: x + y\n"
+    (tmp_path / "lv.yaml").write_text(text)
+    sources = [tmp_path / "lv.yaml", spec.loads(text), phigen.load(tmp_path / "lv.yaml"), from_sympy()]
+    sources.append(spec.loads(f"{text}scheme: splitting\n"))
+    orders = {phigen.compile(source, target="numpy").order for source in sources}
+    assert orders == {json_schema.schema()["properties"]["order"]["default"]} == {4}
+    three = spec.loads(f"{text}terms: 3\n")
+    assert phigen.compile(three, target="numpy").order == phigen.compile(three, "numpy", scheme="splitting").order == 4
 
 
 def test_refuted_mathematics_is_not_compiled():

@@ -29,7 +29,7 @@ from phigen.realisations.cotangent import Cotangent, GradedFunction
 from phigen.realisations.moser import Step, pulled_back, straighten
 from phigen.realisations.protocol import PAPER, BiRealisation, is_symmetric, refuse, reversed_covector
 from phigen.realisations.spray_field import Spray, centred_form, lie_series, make_spray
-from phigen.spec.model import BirealisationChoice
+from phigen.spec.model import DEFAULT_ORDER, BirealisationChoice
 from phigen.symbolic.expression import Expression, call, number, symbol
 from phigen.symbolic.tower import Poly
 from phigen.symbolic.verdict import PROVED
@@ -41,7 +41,6 @@ REFERENCE = f"{PAPER}, section on Poisson sprays; M. Crainic, I. Mărcuţ, J. Sy
 LONGEST = 8
 #: A search for a closed form gives up at polynomials with more terms than this.
 SEARCHED_TERMS = 500
-DEFAULT_ORDER = 4
 #: What to take for the flat spray where it has no closed form.
 KARASEV = "; the kind karasev follows the flow of the same spray to round-off"
 
@@ -204,5 +203,4 @@ def _degree(system: System, choice: BirealisationChoice) -> int:
 
 
 def _order(system: System, choice: BirealisationChoice) -> int:
-    spec = system.spec
-    return choice.order or (spec and (spec.order or (spec.terms and spec.terms + spec.terms % 2))) or DEFAULT_ORDER
+    return choice.order or (system.spec.wanted_order if system.spec else DEFAULT_ORDER)

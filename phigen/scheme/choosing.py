@@ -44,12 +44,11 @@ class Choice:
         return alternation.schedule(self.method, len(self.splitting.flows))
 
 
-def plan(system: System, splitting: Splitting, order: int | None, composition: str) -> Choice:
+def plan(system: System, splitting: Splitting, wanted: int, composition: str) -> Choice:
     """The method that gives an order; odd orders round up.
 
     Raises `SpecError` for orders that the composition lacks, and for parts that it does not apply to.
     """
-    wanted = order or 2
     even = wanted + wanted % 2
     note = "" if even == wanted else f"order {wanted} was asked for; a symmetric method has even order"
     planned = Order(even, 0, note)

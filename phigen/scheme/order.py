@@ -26,7 +26,8 @@ def plan_order(order: int | None, terms: int | None, *, symmetric: bool) -> Orde
         kept = terms if terms % 2 else terms - 1 or 1
         note = "" if kept == terms else f"S_{terms} = 0 in a symmetric bi-realisation"
         return Order(kept + 1, kept, note)
-    order = order or 2
+    if order is None:
+        raise ValueError("a method needs an order or terms")
     if not symmetric:
         return Order(order, order)
     if order % 2:

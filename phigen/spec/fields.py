@@ -18,6 +18,7 @@ from phigen.spec.kinds import (
     Record,
     Text,
 )
+from phigen.spec.model import DEFAULT_ORDER
 from phigen.spec.names import (
     BIREALISATIONS,
     CLASSICAL_METHODS,
@@ -185,7 +186,7 @@ SPEC = Record(
         Field(
             "birealisation", Either({Scalar: KIND, Mapping: BIREALISATION}), "the bi-realisation to use", default="auto"
         ),
-        Field("order", Integer(1, limits.ORDER, limit=True), "order of the method", default=4),
+        Field("order", Integer(1, limits.ORDER, limit=True), "order of the method", default=DEFAULT_ORDER),
         Field("terms", Integer(1, limits.ORDER, limit=True), "instead of order: use exactly S_1, …, S_k"),
         Field("composition", _switch("composition", *COMPOSITIONS), "symmetric composition of steps", default="auto"),
         Field(

@@ -16,6 +16,9 @@ from phigen.errors import Diagnostic, Location
 from phigen.registry import DEFAULT
 from phigen.symbolic.expression import Expression
 
+#: The order of a method that nobody asked an order of.
+DEFAULT_ORDER = 4
+
 Matrix = tuple[tuple[Expression, ...], ...]
 
 
@@ -168,7 +171,7 @@ class Spec:
     casimirs: Mapping[str, Expression] = field(default_factory=dict)
     invariants: Mapping[str, Expression] = field(default_factory=dict)
     birealisation: BirealisationChoice = BirealisationChoice()
-    order: int | None = None  # exactly one of order and terms is set
+    order: int | None = DEFAULT_ORDER  # None where terms are given
     terms: int | None = None
     composition: str = "auto"
     gauge: str | Mapping[str, Expression] = "auto"  # or the multiple of each Casimir
@@ -190,6 +193,11 @@ class Spec:
     def dimension(self) -> int:
         """Number of coordinates."""
         return len(self.coordinates)
+
+    @property
+    def wanted_order(self) -> int:
+        """The order that is asked for; where it is terms, that of a symmetric method with so many."""
+        return self.order or (self.terms or DEFAULT_ORDER) + (self.terms or 0) % 2
 
     def parameters_of(self, run: Run) -> dict[str, float]:
         """The values of all parameters in a run: its own, else the defaults."""

@@ -11,7 +11,7 @@ from phigen.registry import DEFAULT
 from phigen.spec.declarations import Declarations, declare
 from phigen.spec.fields import SPEC
 from phigen.spec.kinds import Reader
-from phigen.spec.model import BirealisationChoice, Extras, MatrixForm, SolverOptions, Spec
+from phigen.spec.model import DEFAULT_ORDER, BirealisationChoice, Extras, MatrixForm, SolverOptions, Spec
 from phigen.spec.names import LICENSE_REFERENCE, LICENSES
 from phigen.spec.poisson import poisson_form
 from phigen.spec.problems import Problems, counted, did_you_mean, shown
@@ -21,7 +21,6 @@ from phigen.spec.yaml_source import Scalar, decode, read
 from phigen.symbolic.expression import ZERO, Expression, symbol, symbols_of
 from phigen.symbolic.symbols import MATRIX, momentum
 
-DEFAULT_ORDER = 4
 #: Options of bi-realisations and the kind that each belongs to.
 OPTIONS = {
     "alpha": ("custom",),

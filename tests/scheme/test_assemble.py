@@ -19,7 +19,6 @@ from phigen.symbolic.symbols import coefficient
 @pytest.mark.parametrize(
     ("order", "terms", "symmetric", "expected"),
     [
-        (None, None, True, (2, 1)),
         (1, None, True, (2, 1)),
         (2, None, True, (2, 1)),
         (3, None, True, (4, 3)),
