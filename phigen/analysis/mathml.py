@@ -8,6 +8,7 @@ it says otherwise, and all text in it is escaped.
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -245,8 +246,15 @@ def _times(*factors: Sum) -> Sum:
     for terms in factors:
         t = _single(terms)
         result = Term(result.coefficient * t.coefficient, result.above + t.above, result.below + t.below)
-    above, below = (tuple(sorted(fs, key=lambda f: _key([f]))) for fs in (result.above, result.below))
+    above, below = (_collected(sorted(fs, key=lambda f: _key([f]))) for fs in (result.above, result.below))
     return _bounded((Term(result.coefficient, above, below),)) if result.coefficient else ()
+
+
+def _collected(factors: Sequence[Factor]) -> tuple[Factor, ...]:
+    """Equal factors as a power, where that is no power of a power."""
+    counts = Counter(factors)
+    powers = {f: f.power(f"<mn>{n}</mn>") for f, n in counts.items() if n > 1 and not f.raised}
+    return tuple(powers.get(f, f) for f, n in counts.items() for _ in range(1 if f in powers else n))
 
 
 def _single(terms: Sum) -> Term:
@@ -273,8 +281,12 @@ def _enclosed(terms: Sum) -> Factor:
 
 def _sorted(terms: Sum) -> Sum:
     """Monomials in the order of their names, as people write them; then other terms, in the order given; one number."""
-    constant = sum((t.coefficient for t in terms if not (t.above or t.below)), Fraction(0))
-    rest = sorted((t for t in terms if t.above or t.below), key=lambda t: _key((*t.above, *t.below)))
+    sums: dict[tuple[tuple[Factor, ...], tuple[Factor, ...]], Fraction] = {}
+    for t in terms:
+        sums[t.above, t.below] = sums.get((t.above, t.below), Fraction(0)) + t.coefficient
+    constant = sums.pop(((), ()), Fraction(0))
+    kept = [Term(c, above, below) for (above, below), c in sums.items() if c]
+    rest = sorted(kept, key=lambda t: _key((*t.above, *t.below)))
     if constant > 0:
         return _bounded((Term(constant), *rest))
     return _bounded(_positive_first([*rest, Term(constant)] if constant else rest))

@@ -58,6 +58,14 @@ def test_function_keeps_its_value(function):
     agrees(power(call(function, *[prey, y][: FUNCTIONS[function].arity]), 3) / y)
 
 
+def test_equal_terms_and_equal_factors_are_collected():
+    shown = {e: mathml.expression(e) for e in (add(sub(x, y), sub(y, x)), add(x * y, y * x), mul(x + y, x + y))}
+    assert shown[add(sub(x, y), sub(y, x))] == "<mn>0</mn>"
+    assert [markup.count("<mi>x</mi>") for markup in shown.values()] == [0, 1, 1]
+    for e in shown:
+        agrees(e)
+
+
 def test_functions_without_other_test():
     agrees(call("acosh", x + 1))
     assert "<mi>φ</mi>" in mathml.expression(call("phi0", x))
