@@ -13,7 +13,16 @@ if TYPE_CHECKING:
     from typing import Any
 
     from phigen.api import compile, load
-    from phigen.errors import CheckError, LimitError, ParameterError, PhigenError, SpecError, StepError, ToolchainError
+    from phigen.errors import (
+        CheckError,
+        LimitError,
+        MissingPackageError,
+        ParameterError,
+        PhigenError,
+        SpecError,
+        StepError,
+        ToolchainError,
+    )
     from phigen.geometry.system import System
     from phigen.runtime.solver import Solver
     from phigen.runtime.trajectory import Trajectory
@@ -26,6 +35,7 @@ _HOMES = {
     "Trajectory": "phigen.runtime.trajectory",
     "CheckError": "phigen.errors",
     "LimitError": "phigen.errors",
+    "MissingPackageError": "phigen.errors",
     "ParameterError": "phigen.errors",
     "PhigenError": "phigen.errors",
     "SpecError": "phigen.errors",
@@ -36,6 +46,7 @@ _HOMES = {
 __all__ = [
     "CheckError",
     "LimitError",
+    "MissingPackageError",
     "ParameterError",
     "PhigenError",
     "Solver",

@@ -5,7 +5,8 @@ exit code  meaning
 ========== =====================================================================
 0          ok
 1          the spec is wrong (`SpecError`)
-2          the command line is wrong (click's own)
+2          the command line is wrong (click's own), a file cannot be read or written,
+           or a Python package for what is asked is missing (`MissingPackageError`)
 3          a limit is exceeded (`LimitError`)
 4          internal error: a bug of phigen
 5          a check failed: mathematics refuted, stale or edited output (`CheckError`)
@@ -99,6 +100,12 @@ class ToolchainError(PhigenError):
     """There is no usable C compiler, or it refused the generated code."""
 
     exit_code = 6
+
+
+class MissingPackageError(PhigenError):
+    """What was asked for needs a Python package that is not installed."""
+
+    exit_code = 2
 
 
 class StepError(PhigenError):

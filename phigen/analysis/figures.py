@@ -2,7 +2,7 @@
 
 Each function returns a `matplotlib.figure.Figure` and leaves matplotlib's global state as it was. The colours are those
 of `phigen.analysis.drawing.palette.PALETTE`; `save` and `svg` there write figures so that their bytes are a function of
-what they show. matplotlib is the optional extra ``plot``; without it every function here raises `ToolchainError`.
+what they show. matplotlib is the optional extra ``plot``; without it every function here raises `MissingPackageError`.
 """
 
 from __future__ import annotations

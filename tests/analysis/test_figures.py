@@ -22,7 +22,7 @@ from phigen.analysis.figures import (
     trajectory_figure,
 )
 from phigen.analysis.lyapunov import Spectrum
-from phigen.errors import ToolchainError
+from phigen.errors import MissingPackageError
 from phigen.runtime.trajectory import Trajectory
 from phigen.symbolic.expression import power, symbol
 
@@ -151,8 +151,9 @@ def test_colours_stand_out_on_light_and_dark_pages(colour):
 
 def test_without_matplotlib_the_extra_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "matplotlib", None)
-    with pytest.raises(ToolchainError, match=r"phigen\[plot\]"):
+    with pytest.raises(MissingPackageError, match="not installed\n  hint: pip install matplotlib") as raised:
         error_figure({"a": spiral()})
+    assert raised.value.exit_code == 2
 
 
 def test_files_of_other_kinds_are_refused(tmp_path):

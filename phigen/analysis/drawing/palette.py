@@ -10,7 +10,7 @@ from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
-from phigen.errors import ToolchainError
+from phigen.errors import MissingPackageError
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -83,12 +83,12 @@ MARK: Mapping[str, Any] = {"color": PALETTE["muted"], "linewidth": 0.8, "linesty
 
 
 def require_matplotlib() -> None:
-    """Raises `ToolchainError` if it is not installed."""
+    """Raises `MissingPackageError` if it is not installed, or is not whole."""
     try:
         import matplotlib  # noqa: F401
-    except ImportError:
-        message = f"figures need matplotlib, which is not installed\n  hint: {INSTALLED_BY}"
-        raise ToolchainError(message) from None
+    except ImportError as error:
+        what = "is not installed" if error.name == "matplotlib" else f"cannot be imported: {error}"
+        raise MissingPackageError(f"figures need matplotlib, which {what}\n  hint: {INSTALLED_BY}") from error
 
 
 @contextmanager
