@@ -1,0 +1,118 @@
+"""The Hamilton–Jacobi series derived a second time, by sympy alone: a page to be read beside docs/mathematics.md.
+
+S_t(x) = t S_1 + t² S_2 + … solves ∂_t S_t(x) = H(α(x, ∇S_t(x))), S_0 = 0. By Taylor's formula, twice,
+
+    p(t) = ∇S_t(x)          = Σ_j t^j ∇S_j(x),
+    Δ(t) = α(x, p(t)) − x   = Σ_μ a_μ(x) p(t)^μ,    a_μ = ∂_p^μ α(x, 0)/μ!,
+    ∂_t S_t = H(x + Δ(t))   = Σ_ν H_ν(x) Δ(t)^ν,    H_ν = ∂_x^ν H(x)/ν!,
+
+with multi-indices μ ≠ 0 and ν. The coefficients of t^i are (i + 1) S_{i+1} on the left, and on the right a
+polynomial in a_μ, H_ν and ∇S_1 … ∇S_i with |μ|, |ν| ≤ i, since p(t) and Δ(t) begin with t.
+
+The compiler knows none of this: it shares neither the ring, nor derivatives, nor the arithmetic of series.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import cache
+from typing import Any
+
+import sympy
+
+from phigen.series.reference_functions import Functions, derivative
+
+#: A multi-index, one exponent for each variable.
+Index = tuple[int, ...]
+
+#: The coefficients of Taylor's formula.
+Coefficients = Mapping[Index, Any]
+
+#: The a_μ of α_1 … α_n with 0 < |μ| ≤ a degree.
+Source = Callable[[int], Sequence[Coefficients]]
+
+
+def generating_function(hamiltonian: Any, source: Source, x: Sequence[Any]) -> Iterator[Any]:
+    """S_1, S_2, … without end, as sympy expressions in x and the parameters.
+
+    ``hamiltonian`` is H, ``source`` gives the a_μ: see `closed_form` and `phigen.series.reference_paths`.
+    """
+    found: list[Any] = []
+    while True:
+        i = len(found)
+        found.append(_coefficient(i, taylor(hamiltonian, x, i), source(i), found, x) / (i + 1))
+        yield found[-1]
+
+
+def closed_form(alpha: Sequence[Any], p: Sequence[Any]) -> Source:
+    """The a_μ of expressions in x and p which are regular at p = 0 as they are written."""
+
+    def source(degree: int) -> list[dict[Index, Any]]:
+        return [{m: a for m, a in _at_origin(e, p, degree).items() if 0 < sum(m) <= degree} for e in alpha]
+
+    return source
+
+
+def _at_origin(f: Any, p: Sequence[Any], degree: int) -> dict[Index, Any]:
+    """∂_p^μ f/μ! at p = 0; of a polynomial in p, its coefficients."""
+    functions = Functions([f, *p])
+    if not any(g.has(*p) for g in functions if g not in p):
+        return {m: functions.expression(c) for m, c in functions.split(functions.element(f), p).items()}
+    return {m: c.subs(dict.fromkeys(p, sympy.Integer(0))) for m, c in taylor(f, p, degree).items()}
+
+
+def taylor(f: Any, variables: Sequence[Any], degree: int) -> dict[Index, Any]:
+    """∂^μ f/μ! for |μ| ≤ degree, zeros left out."""
+    n = len(variables)
+    level: dict[Index, Any] = {(0,) * n: f}
+    result = dict(level)
+    for _ in range(degree):
+        raised = {}
+        for index, g in level.items():
+            last = max((k for k in range(n) if index[k]), default=0)
+            for k in range(last, n):  # each multi-index is reached once, along its variables in order
+                slope = derivative(g, variables[k]) / (index[k] + 1)
+                if slope != 0:
+                    raised[_raised(index, k, 1)] = slope
+        level = raised
+        result |= level
+    return result
+
+
+def _coefficient(
+    i: int, energy: Coefficients, source: Sequence[Coefficients], found: Sequence[Any], x: Sequence[Any]
+) -> Any:
+    """[t^i] Σ_ν H_ν Δ(t)^ν, with Δ(t) = Σ_μ a_μ p(t)^μ and p(t) = Σ_j t^j ∇S_j."""
+    slopes = [[derivative(s, c) for s in found] for c in x]
+    every = [*energy.values(), *(a for d in source for a in d.values()), *(g for row in slopes for g in row)]
+    functions = Functions(every)
+    momentum = Series(functions, lambda k, j: functions.element(slopes[k][j - 1]))
+    displacement = Series(functions, lambda k, j: momentum.combined(source[k], j))
+    return functions.expression(displacement.combined(energy, i))
+
+
+class Series:
+    """Power series u_1, …, u_n that begin with t; ``coefficient(k, j)`` is [t^j] u_k."""
+
+    def __init__(self, functions: Functions, coefficient: Callable[[int, int], Any]) -> None:
+        self._functions = functions
+        self._coefficient = cache(coefficient)
+        self._power = cache(self._product)
+
+    def combined(self, coefficients: Coefficients, j: int) -> Any:
+        """[t^j] Σ_μ c_μ u(t)^μ."""
+        element = self._functions.element
+        return self._functions.total(element(c) * self._power(mu, j) for mu, c in coefficients.items() if sum(mu) <= j)
+
+    def _product(self, mu: Index, j: int) -> Any:
+        """[t^j] u(t)^μ: the sum over the share of t^j that one factor has."""
+        if not any(mu):
+            return self._functions.ring(int(j == 0))
+        k = next(k for k, e in enumerate(mu) if e)
+        rest = _raised(mu, k, -1)
+        shares = range(1, j - sum(rest) + 1)
+        return self._functions.total(self._coefficient(k, a) * self._power(rest, j - a) for a in shares)
+
+
+def _raised(index: Index, k: int, by: int) -> Index:
+    return (*index[:k], index[k] + by, *index[k + 1 :])

@@ -1,0 +1,89 @@
+"""The axioms of a bi-realisation, up to a degree in p, decided a second time by sympy.
+
+With α = x + Σ_μ a_μ(x) p^μ, β likewise, and {x_i, p_j} = δ_ij, the parts of degree m < d of
+
+    {α_i, α_j} − π_ij∘α,    {β_i, β_j} + π_ij∘β,    {α_i, β_j}
+
+are polynomials in a_μ, b_μ and their derivatives with |μ| ≤ d, and in the π_ν of Taylor's formula for π.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from math import prod
+from typing import Any
+
+from phigen.series.reference import Coefficients, Index, Series, taylor
+from phigen.series.reference_functions import Functions, derivative
+
+
+def defects(
+    poisson: Any,
+    alpha: Sequence[Coefficients],
+    beta: Sequence[Coefficients],
+    x: Sequence[Any],
+    p: Sequence[Any],
+    d: int,
+) -> Iterator[tuple[str, Any]]:
+    """The parts that are not seen to be 0, with what they are of; ``poisson`` is the matrix π(x).
+
+    ``alpha`` and ``beta`` are the a_μ and b_μ with 0 < |μ| ≤ d.
+    """
+    n = len(x)
+    tensor = {(i, j): taylor(poisson[i, j], x, d - 1) for i in range(n) for j in range(i)}
+    parts = _Parts([*alpha, *beta], [c for entry in tensor.values() for c in entry.values()], x, p)
+    functions, at_alpha, at_beta = parts.functions, parts.deviation(0), parts.deviation(n)
+    for m in range(d):
+        found = {}
+        for (i, j), entry in tensor.items():
+            found[f"{{α_{x[i]}, α_{x[j]}}}"] = parts.bracket(i, j, m) - at_alpha.combined(entry, m)
+            found[f"{{β_{x[i]}, β_{x[j]}}}"] = parts.bracket(n + i, n + j, m) + at_beta.combined(entry, m)
+        found |= {f"{{α_{x[i]}, β_{x[j]}}}": parts.bracket(i, n + j, m) for i in range(n) for j in range(n)}
+        for name, rest in found.items():
+            if not functions.vanishes(rest):
+                yield f"{name} in degree {m}", functions.expression(rest)
+
+
+class _Parts:
+    """The maps by degree in p, with their slopes, as elements of one ring."""
+
+    def __init__(self, maps: Sequence[Coefficients], others: Sequence[Any], x: Sequence[Any], p: Sequence[Any]) -> None:
+        n = len(x)
+        self._maps = [{(0,) * n: x[k % n], **{mu: a for mu, a in f.items() if any(mu)}} for k, f in enumerate(maps)]
+        self._slopes = [[{mu: derivative(a, c) for mu, a in f.items()} for c in x] for f in self._maps]
+        self._p = p
+        every = [*self._maps, *(s for slopes in self._slopes for s in slopes)]
+        self.functions = Functions([*p, *others, *(e for f in every for e in f.values())])
+        self._known: dict[tuple[int, int, int | None], Any] = {}
+
+    def deviation(self, first: int) -> Series:
+        """α − x or β − x, a series in the degree in p."""
+        return Series(self.functions, lambda k, m: self._part(first + k, m))
+
+    def bracket(self, f: int, g: int, degree: int) -> Any:
+        """The part of {f, g} = Σ_c ∂f/∂x_c ∂g/∂p_c − ∂f/∂p_c ∂g/∂x_c of a degree."""
+        splits = [(k, degree + 1 - k) for k in range(degree + 2)]
+        terms = (
+            self._part(f, k, c) * self._along(g, m, c) - self._along(f, k, c) * self._part(g, m, c)
+            for k, m in splits
+            for c in range(len(self._p))
+        )
+        return self.functions.total(terms)
+
+    def _part(self, f: int, degree: int, c: int | None = None) -> Any:
+        """The part of a map, or of its derivative along x_c, of a degree in p."""
+        key = (f, degree, c)
+        if key not in self._known:
+            listed = self._maps[f] if c is None else self._slopes[f][c]
+            element = self.functions.element
+            terms = (element(a) * self._monomial(mu) for mu, a in listed.items() if sum(mu) == degree)
+            self._known[key] = self.functions.total(terms)
+        return self._known[key]
+
+    def _monomial(self, mu: Index) -> Any:
+        powers = (self.functions.element(pk) ** e for pk, e in zip(self._p, mu, strict=True) if e)
+        return prod(powers, start=self.functions.ring(1))
+
+    def _along(self, f: int, degree: int, c: int) -> Any:
+        """∂f/∂p_c of the part of a degree."""
+        return self._part(f, degree).diff(self.functions.element(self._p[c]))

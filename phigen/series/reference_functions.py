@@ -1,0 +1,178 @@
+"""Polynomials in functions, by sympy: what the second derivation computes with, and how it proves that something is 0.
+
+A *function* is what does not expand: x, a parameter, exp(x), sin(x), π, and of powers 1/b, b^{1/q} and b^{cx}. Powers
+whose exponent is a sum make products, and so do tan u = sin u/cos u, tanh u = sinh u/cosh u and |u| = u sign u.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from math import prod
+from typing import Any
+
+import sympy
+from sympy.polys.rings import ring
+
+#: A polynomial with more terms than this ends the derivation: the next product would take minutes.
+MOST_TERMS = 200_000
+
+_QUOTIENTS = {
+    sympy.tan: (sympy.sin, sympy.cos),
+    sympy.cot: (sympy.cos, sympy.sin),
+    sympy.tanh: (sympy.sinh, sympy.cosh),
+}
+
+
+class Sign(sympy.Function):  # type: ignore[misc]
+    """The sign of u, whose derivative is 0 wherever it exists; sympy's own has a Dirac delta for it."""
+
+    @classmethod
+    def eval(cls, u: Any) -> Any:
+        """Odd, and known for numbers."""
+        if u.is_number:
+            return sympy.sign(u)
+        return -cls(-u) if u.could_extract_minus_sign() else None
+
+    def fdiff(self, argindex: int = 1) -> Any:
+        """0."""
+        return sympy.Integer(0)
+
+
+def derivative(f: Any, variable: Any) -> Any:
+    """∂f/∂x."""
+    if f.has(sympy.Abs, sympy.sign):
+        f = f.replace(sympy.Abs, lambda u: u * Sign(u)).replace(sympy.sign, Sign)
+    return sympy.diff(f, variable)
+
+
+class Functions:
+    """The ring of polynomials over Q in the functions that some expressions contain."""
+
+    def __init__(self, expressions: Iterable[Any]) -> None:
+        listed: dict[Any, None] = {}
+        _list_functions(expressions, listed)
+        symbols = [sympy.Dummy() for _ in listed] or [sympy.Dummy()]
+        self.ring, *generators = ring(symbols, sympy.QQ)
+        self._generators = dict(zip(listed, generators, strict=False))
+        self._written = dict(zip(symbols, listed, strict=False))
+        self._known: dict[Any, Any] = {}
+
+    def __iter__(self) -> Any:
+        return iter(self._generators)
+
+    def element(self, e: Any) -> Any:
+        """The expression as a polynomial in the functions."""
+        if e not in self._known:
+            self._known[e] = self._element(e)
+        return self._known[e]
+
+    def _element(self, e: Any) -> Any:
+        if e in self._generators:
+            return self._generators[e]
+        if e.is_Rational:
+            return self.ring.ground_new(self.ring.domain.from_sympy(e))
+        if e.is_Add:
+            return self.total(map(self.element, e.args))
+        return prod((self.element(f) ** n for f, n in _factors(e)), start=self.ring.one)
+
+    def expression(self, element: Any) -> Any:
+        """The polynomial as an expression, in which sympy cancels x · (1/x)."""
+        return element.as_expr().xreplace(self._written)
+
+    def total(self, elements: Iterable[Any]) -> Any:
+        """The sum of elements. Raises `OverflowError` if it has more than `MOST_TERMS` terms."""
+        result: dict[Any, Any] = {}
+        for element in elements:
+            for monomial, c in element.items():
+                result[monomial] = result[monomial] + c if monomial in result else c
+            if len(result) > MOST_TERMS:
+                raise OverflowError(f"more than {MOST_TERMS} terms")
+        return self.ring.from_dict({monomial: c for monomial, c in result.items() if c})
+
+    def split(self, element: Any, variables: Sequence[Any]) -> dict[tuple[int, ...], Any]:
+        """The coefficients of the monomials in some of the functions, by their exponents."""
+        places = [self.ring.gens.index(self._generators[f]) for f in variables]
+        parts: dict[tuple[int, ...], dict[Any, Any]] = {}
+        for m, c in element.items():
+            rest = tuple(0 if k in places else e for k, e in enumerate(m))
+            parts.setdefault(tuple(m[k] for k in places), {})[rest] = c
+        return {mu: self.ring.from_dict(part) for mu, part in parts.items()}
+
+    def vanishes(self, element: Any) -> bool:
+        """True proves that the element is 0 where it is defined; False, only that the relations do not make it 0."""
+        for f in reversed(self._generators):  # what a relation refers to is listed before
+            found = _relation(f)
+            if found is None:
+                continue
+            power, value = found
+            parts = {e: c for (e,), c in self.split(element, [f]).items()}
+            if set(parts) <= {0}:
+                continue
+            own, g = self._generators[f], self.element(value)
+            if power < 0:  # f g = 1, so a multiple has no f
+                top = max(parts)
+                element = self.total(c * g ** (top - e) for e, c in parts.items())
+            else:  # f^power = g
+                element = self.total(c * own ** (e % power) * g ** (e // power) for e, c in parts.items())
+        return bool(element == 0)
+
+
+def _list_functions(expressions: Iterable[Any], listed: dict[Any, None]) -> None:
+    """Add the functions that occur, each after those that its relation refers to."""
+    for e in expressions:
+        if e in listed or e.is_Rational:
+            continue
+        parts = [(a, 1) for a in e.args] if e.is_Add else _factors(e)
+        if parts != [(e, 1)]:
+            _list_functions([a for a, _ in parts], listed)
+            continue
+        found = _relation(e)
+        _list_functions([found[1]] if found else [], listed)
+        listed[e] = None
+
+
+def _relation(f: Any) -> tuple[int, Any] | None:
+    """(q, g) if f^q = g with q > 1, (−1, g) if f g = 1."""
+    if isinstance(f, sympy.sin):
+        return 2, 1 - sympy.cos(*f.args) ** 2
+    if isinstance(f, sympy.cosh):
+        return 2, 1 + sympy.sinh(*f.args) ** 2
+    if isinstance(f, Sign):
+        return 2, sympy.Integer(1)
+    base, exponent = f.as_base_exp()
+    if exponent.could_extract_minus_sign():
+        return -1, base**-exponent
+    return (int(exponent.q), base) if exponent.is_Rational and exponent != 1 else None
+
+
+def _factors(e: Any) -> list[tuple[Any, int]]:
+    """What e is a product of, as pairs of an expression and the power of it; of a function, the function alone."""
+    if e.is_Mul:
+        return [(a, 1) for a in e.args]
+    if isinstance(e, sympy.Abs | sympy.sign):
+        u = e.args[0]
+        return [(u, 1), (Sign(u), 1)] if isinstance(e, sympy.Abs) else [(Sign(u), 1)]
+    if type(e) in _QUOTIENTS:
+        over, under = _QUOTIENTS[type(e)]
+        return [(over(*e.args), 1), (1 / under(*e.args), 1)]
+    if e.is_Pow or isinstance(e, sympy.exp):
+        base, exponent = e.as_base_exp()
+        terms = sympy.Add.make_args(sympy.expand(exponent))
+        return [pair for term in terms for pair in _powers(sympy.expand(base), term)]
+    return [(e.func(*map(sympy.expand, e.args)) if e.args else e, 1)]
+
+
+def _powers(base: Any, exponent: Any) -> list[tuple[Any, int]]:
+    """The factors of base^exponent, the exponent a number or a product."""
+    c, m = exponent.as_coeff_Mul(rational=True)
+    if m != 1:
+        return [(base ** (sympy.sign(c) * m / c.q), abs(int(c.p)))]
+    whole, rest = divmod(int(c.p), int(c.q))
+    root = [(base ** sympy.Rational(1, c.q), rest)] if rest else []
+    if whole >= 0:
+        return [(base, whole), *root] if whole else root
+    content, primitive = base.as_content_primitive()
+    if primitive.could_extract_minus_sign():
+        content, primitive = -content, -primitive
+    scale = [(content**whole, 1)] if content != 1 else []
+    return [*scale, (1 / primitive, -whole), *root]

@@ -1,0 +1,71 @@
+"""α and β of Karasev's construction, derived a second time by sympy: the path ṁ = π(m)p about its mean.
+
+For 0 ≤ s ≤ 1 and constant p, let x be the mean of the path, and m(s) = x + m_1(s) + m_2(s) + …, m_k of degree k in p:
+
+    dm_k/ds = part of degree k of π(m)p = Σ_ν π_ν(x)p (m_1 + … + m_{k−1})^ν,    π_ν = ∂^ν π(x)/ν!,
+    ∫₀¹ m_k ds = 0,
+
+which give m_1 = (s − ½) πp, and so on. Then α = m(0) and β = m(1). There is nothing to invert.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import sympy
+
+from phigen.series.reference import Index, Series, Source, taylor
+from phigen.series.reference_functions import Functions
+
+
+def paths(poisson: Any, x: Sequence[Any], p: Sequence[Any], s: Any) -> Iterator[list[Any]]:
+    """m_1(s), m_2(s), … without end, each n expressions in x, p and s; ``poisson`` is the matrix π(x)."""
+    found: list[list[Any]] = []
+    while True:
+        found.append(_part(poisson, found, x, p, s))
+        yield found[-1]
+
+
+def _part(poisson: Any, found: Sequence[Sequence[Any]], x: Sequence[Any], p: Sequence[Any], s: Any) -> list[Any]:
+    """m_k from those before it."""
+    below, n = len(found), len(x)
+    tensor = [[taylor(poisson[a, b], x, below) for b in range(n)] for a in range(n)]
+    every = [c for row in tensor for entry in row for c in entry.values()]
+    functions = Functions([*every, *p, s, *(m for part in found for m in part)])
+    deviation = Series(functions, lambda k, j: functions.element(found[j - 1][k]))
+    return [_centred(functions, _velocity(functions, deviation, row, p, below), s) for row in tensor]
+
+
+def _velocity(functions: Functions, deviation: Series, row: Sequence[Any], p: Sequence[Any], below: int) -> Any:
+    """One component of π(m)p in degree k, of π(m) in degree k − 1."""
+    return functions.total(
+        deviation.combined(entry, below) * functions.element(pb) for entry, pb in zip(row, p, strict=True)
+    )
+
+
+def _centred(functions: Functions, velocity: Any, s: Any) -> Any:
+    """The integral over s whose mean from 0 to 1 is 0."""
+    own, rational = functions.element(s), sympy.QQ
+    return functions.expression(
+        functions.total(
+            c * (own ** (e + 1) * rational(1, e + 1) - rational(1, (e + 1) * (e + 2)))
+            for (e,), c in functions.split(velocity, [s]).items()
+        )
+    )
+
+
+def source_of_paths(poisson: Any, x: Sequence[Any], p: Sequence[Any], time: int = 0) -> Source:
+    """The a_μ of α = m(0), or those of β = m(1)."""
+    s = sympy.Dummy("s")
+    following = paths(poisson, x, p, s)
+    parts: list[list[Any]] = []
+
+    def source(degree: int) -> list[dict[Index, Any]]:
+        while len(parts) < degree:
+            parts.append([m.subs(s, time) for m in next(following)])
+        functions = Functions([*p, *(m for part in parts for m in part)])
+        ends = [functions.total(functions.element(part[k]) for part in parts[:degree]) for k in range(len(x))]
+        return [{mu: functions.expression(c) for mu, c in functions.split(e, p).items()} for e in ends]
+
+    return source
